@@ -53,7 +53,7 @@ PointFile open_container(const std::filesystem::path& path, const Selection& sel
   if (selection.takes_all()) info.count = container->superblock().points;
   info.has_normals = info.has_radius = true;
   info.has_radiance = !sky_is_gathered(*container);
-  info.has_emission = container->header().point_bytes != kPointBytes && !selection.level;
+  info.has_emission = may_emit(*container) && !selection.level;
   info.has_albedo = !selection.level && has_colours(container->meta().text);
   info.text = container->meta().text;
   for (const char* made :

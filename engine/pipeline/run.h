@@ -22,6 +22,11 @@ struct RunOptions {
   unsigned threads = 0;
   /// Directories over which temporary files are spread; when empty, the output's directory.
   std::vector<std::filesystem::path> temp_dirs;
+
+  /// Lowers the cap by what a caller holds while another run works for it, to no less than a byte.
+  void hold(std::uint64_t bytes) noexcept {
+    memory_bytes = memory_bytes > bytes ? memory_bytes - bytes : 1;
+  }
 };
 
 /// Wall time of each stage: name and seconds, in the order in which the stages ended.

@@ -55,11 +55,14 @@ glm::vec3 up_of(const std::map<std::string, std::string>& text) {
   return {0, 1, 0};
 }
 
-LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
+LightRig recorded_rig(const ContainerReader& container) {
   const auto& text = container.meta().text;
   const auto found = text.find(kLightsKey);
-  if (found == text.end()) return {};
-  LightRig rig = light_rig_from_json(found->second);
+  return found == text.end() ? LightRig() : light_rig_from_json(found->second);
+}
+
+LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
+  LightRig rig = recorded_rig(container);
   const std::string file = container.path().string();
   try {
     if (load_sky_map(rig.sky, directory_of(container.path())) == SkyMap::changed) {
@@ -102,6 +105,10 @@ void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_by
 
 bool lit_by_emitters(const ContainerReader& container) {
   return container.meta().text.contains(kEmittersKey);
+}
+
+bool may_emit(const ContainerReader& container) {
+  return container.header().point_bytes != kPointBytes;
 }
 
 bool sky_is_gathered(const ContainerReader& container) {

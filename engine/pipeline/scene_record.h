@@ -48,6 +48,11 @@ void join_texts(std::map<std::string, std::string>& text,
 /// of points: +y when they do not name it.
 [[nodiscard]] glm::vec3 up_of(const std::map<std::string, std::string>& text);
 
+/// Returns the lights that a container was built with, without the picture of their sky; no lights
+/// when the container records none.
+/// @throws DataError when the record is no light rig
+[[nodiscard]] LightRig recorded_rig(const ContainerReader& container);
+
 /// Returns the lights that a container was built with, and loads the picture of their sky; no
 /// lights when the container records none.
 /// @param progress  gets a note when the picture is no longer the one that was recorded
@@ -74,6 +79,9 @@ void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_by
 /// Returns true when emissive triangles lit the surfels, so that the radiance of the surfels around
 /// an emitter includes the light that it gave them.
 [[nodiscard]] bool lit_by_emitters(const ContainerReader& container);
+
+/// Says whether the points of a container have room for what they emit.
+[[nodiscard]] bool may_emit(const ContainerReader& container);
 
 /// Returns true when the radiance of the surfels leaves out the light of the sky, so that a picture
 /// of them adds what the gather finds of it.

@@ -270,10 +270,10 @@ class Build {
     Meta meta = make_meta(request_, inputs);
     if (inputs.clouds.scan && inputs.clouds.points > 0) add_marks(meta);
     check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
-    SortedPoints points{.plan = {.frame = frame_of(inputs.bounds),
-                                 .scan = inputs.clouds.scan,
-                                 .emits = inputs.emitters || inputs.clouds.emits ||
-                                          (scene_ && scene_->header().point_bytes != kPointBytes)}};
+    SortedPoints points{
+        .plan = {.frame = frame_of(inputs.bounds),
+                 .scan = inputs.clouds.scan,
+                 .emits = inputs.emitters || inputs.clouds.emits || (scene_ && may_emit(*scene_))}};
     const Frame& frame = points.plan.frame;
 
     // Charge the inputs to the memory cap
@@ -351,8 +351,7 @@ class Build {
     LightRequest lighting{{.scene = unlit_path_, .run = request_.run}};
     if (scene_) {
       lighting.replaces = &scene_->file();
-      const std::uint64_t open = ContainerReader::kMaxPageBytes * scene_->page_count();
-      lighting.run.memory_bytes -= std::min(open, lighting.run.memory_bytes - 1);
+      lighting.run.hold(ContainerReader::kMaxPageBytes * scene_->page_count());
     }
     lighting.lights = rig_;
     lighting.light_sampling = request_.sampling.lights;

@@ -179,7 +179,7 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
       .has_radius = true,
       .has_radiance = superblock.flux != std::array<double, 3>{} && !sky_is_gathered(container),
       .has_albedo = !selection.level && has_colours(container.meta().text),
-      .emits = container.header().point_bytes != kPointBytes && !selection.level,
+      .emits = may_emit(container) && !selection.level,
       .colour_from = options.colour_from};
   if (!options.las_records.empty()) info.text[kLasRecordsKey] = options.las_records;
   info.bounds = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};

@@ -7,6 +7,7 @@
 
 #include "engine/base/basis.h"
 #include "engine/io/cloud/record.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
 #include "engine/store/container_points.h"
 
@@ -32,7 +33,7 @@ glm::vec3 quarter(const Surfel& surfel, const Basis& basis, unsigned place) {
 /// Calls visit(point) for each point of a container that emits.
 template <class Visit>
 void for_each_emitting(const ContainerReader& container, const Visit& visit) {
-  if (container.header().point_bytes == kPointBytes) return;
+  if (!may_emit(container)) return;
   ContainerPoints points(container);
   std::vector<PointRecord> block(DiscLight::kBlock);
   while (const std::size_t count = points.next(block)) {
@@ -85,7 +86,8 @@ DiscLight::~DiscLight() = default;
 std::uint64_t DiscLight::thread_bytes(const LightRig& rig, const LightSampling& sampling) noexcept {
   const std::uint64_t place = rig.suns.size() * std::uint64_t{share(sampling.sun_rays)} +
                               rig.points.size() + rig.spots.size() + share(sampling.area_rays);
-  // Of a ray there are what is drawn, what is traced and its order, in vectors that grow by halves
+  // A ray takes a LightRay, and some 60 bytes until it is traced. Vectors that grow take twice as
+  // much
   return ShadowTracer::kBytes + 2 * (kRays + place) * (sizeof(LightRay) + 64);
 }
 

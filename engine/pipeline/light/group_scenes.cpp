@@ -9,10 +9,6 @@
 
 namespace ptc {
 
-bool may_emit(const ContainerReader& scene) {
-  return scene.header().point_bytes != kPointBytes;
-}
-
 std::vector<std::string> groups_of(const LightingRequest& request, const LightRig& rig,
                                    bool emits) {
   const auto excludes = [](bool given, const char* field) {

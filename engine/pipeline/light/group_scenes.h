@@ -1,10 +1,8 @@
 // Scenes of which one group of lights shines: how the light of groups is kept apart.
 //
-//   scene.ptcx ---- lights of key  ----> temporary container ---- shaded or rendered ---> light_key
-//              ---- lights of fill ----> temporary container ---- shaded or rendered --->
-//              light_fill
-//              ---- all other light ---> temporary container ---- shaded or rendered --->
-//              light_rest
+//   scene ---- lights of key  ----> temporary container ---- shaded or rendered ---> light_key
+//         ---- lights of fill ----> temporary container ---- shaded or rendered ---> light_fill
+//         ---- all other light ---> temporary container ---- shaded or rendered ---> light_rest
 #pragma once
 
 #include <filesystem>
@@ -18,9 +16,6 @@
 #include "engine/scene/light/lights.h"
 
 namespace ptc {
-
-/// Says whether points of a scene may emit.
-[[nodiscard]] bool may_emit(const ContainerReader& scene);
 
 /// The groups of a scene's lights, with the empty name of the rest at the end where there is one.
 /// @param emits  whether points or meshes emit

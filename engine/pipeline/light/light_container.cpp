@@ -221,8 +221,6 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   const ContainerReader scene(request.scene);
   const LightRig rig =
       normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
-  const bool emits = request.emission && scene.superblock().points > 0 &&
-                     scene.header().point_bytes != kPointBytes;
   const Meta planned = lit_meta(scene, rig, true);
   check_scene(scene, planned);
   if (planned.channels.size() < scene.meta().channels.size())
@@ -230,7 +228,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
         "the channels of an earlier shading are left out, because they are of other light");
 
   const std::uint64_t emitting =
-      emits && request.light_sampling.area_rays > 0 ? count_emitting(scene) : 0;
+      request.emission && request.light_sampling.area_rays > 0 ? count_emitting(scene) : 0;
   report.emitters = 2 * emitting;
   if (!request.lights && emitting == 0 && light_groups(rig, false).empty()) {
     throw RequestError("lights", scene.path().string() +
@@ -246,7 +244,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                                               executor.threads()) +
                     held_pages_bytes(scene.header().page_shift));
   const auto sky = sky_function(rig.sky);
-  const bool by_rays = emitting > 0 || !LightRays(rig, {}, {}, 0).empty();
+  const bool by_rays = emitting > 0 || has_lamps(rig);
   if (by_rays) {
     budget.charge("shadow rays",
                   executor.threads() * DiscLight::thread_bytes(rig, request.light_sampling));

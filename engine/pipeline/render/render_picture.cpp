@@ -410,7 +410,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     const bool rest = group.empty();
     RenderRequest one = request;
     one.lights = only_group(rig, group);
-    one.run.memory_bytes -= std::min(held, one.run.memory_bytes - 1);
+    one.run.hold(held);
     const RelitScene lit(one, *one.lights, rest, request.light_sampling, targets.front().path,
                          report.seconds, silent);
     // Render it, and add the picture to the sum

@@ -347,7 +347,7 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
     ShadedExtras extras{.estimates = request.estimate};
     if (request.light_groups) {
       const ContainerReader scene(request.scene);
-      extras.groups = groups_of(request, recorded_lights(scene, progress), may_emit(scene));
+      extras.groups = groups_of(request, recorded_rig(scene), may_emit(scene));
     }
     const std::vector<Channel> added = shading_channels(extras);
     info.channels.insert(info.channels.end(), added.begin(), added.end());

@@ -6,7 +6,6 @@
 //   scene of all lamps: the points' own light ----------------------+
 #include "engine/pipeline/shade/shaded_groups.h"
 
-#include <algorithm>
 #include <cassert>
 #include <cstring>
 #include <deque>
@@ -143,8 +142,7 @@ LightingReport shade_groups(
   ShadeRequest one = request;  // with what the containers that are open leave of the memory
   one.light_groups = one.original_order = false;
   const auto hold = [&](const ContainerReader& container) {
-    const std::uint64_t held = ContainerReader::kPageBytes * container.page_count();
-    one.run.memory_bytes -= std::min(held, one.run.memory_bytes - 1);
+    one.run.hold(ContainerReader::kPageBytes * container.page_count());
   };
   hold(scene);
   std::deque<ShadedGroup> groups;

@@ -31,12 +31,7 @@ LightRays::LightRays(LightRig rig, std::vector<Emitter> emitters, const glm::dve
     : rig_(std::move(rig)), area_(std::move(emitters)), origin_(origin), closest_(closest) {}
 
 bool LightRays::empty() const noexcept {
-  const glm::vec3 dark(0);
-  return area_.empty() &&
-         std::ranges::all_of(rig_.suns, [&](const Sun& s) { return s.irradiance == dark; }) &&
-         std::ranges::all_of(rig_.points,
-                             [&](const PointLight& p) { return p.intensity == dark; }) &&
-         std::ranges::all_of(rig_.spots, [&](const SpotLight& s) { return s.intensity == dark; });
+  return area_.empty() && !has_lamps(rig_);
 }
 
 // The disc of the sun has one radiance, so directions are drawn with a density in proportion to the

@@ -63,6 +63,13 @@ double spot_share(const SpotLight& spot, const glm::dvec3& place) noexcept {
   return linear * linear;
 }
 
+bool has_lamps(const LightRig& rig) {
+  const auto shines = [](const glm::vec3& light) { return light != glm::vec3(0); };
+  return std::ranges::any_of(rig.suns, shines, &Sun::irradiance) ||
+         std::ranges::any_of(rig.points, shines, &PointLight::intensity) ||
+         std::ranges::any_of(rig.spots, shines, &SpotLight::intensity);
+}
+
 bool is_group_name(std::string_view text) noexcept {
   constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz0123456789_";
   constexpr std::size_t kMost =

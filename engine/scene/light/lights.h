@@ -103,6 +103,9 @@ struct LightRig {
   Sky sky;
 };
 
+/// Says whether a sun, a point light or a spot light shines.
+[[nodiscard]] bool has_lamps(const LightRig& rig);
+
 /// The name that the group of the rest has in channels and layers.
 inline constexpr const char* kRestGroup = "rest";
 

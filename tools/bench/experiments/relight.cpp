@@ -10,7 +10,6 @@
 #include "tools/bench/experiments/relight.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -89,15 +88,14 @@ class MeshLight {
 /// The irradiance of some surfels.
 struct Truth {
   std::vector<double> values;
-  std::vector<bool> away;  ///< whether light is even around, so that no shadow ends near
+  std::vector<char> away;  ///< whether light is even around, so that no shadow ends near
   double mean = 0;
 };
 
 Truth make_truth(const MeshLight& light, std::span<const Surfel> surfels, bool sky, unsigned rays,
                  const Executor& executor) {
   Truth truth{.values = std::vector<double>(surfels.size()),
-              .away = std::vector<bool>(surfels.size())};
-  std::vector<char> away(surfels.size());
+              .away = std::vector<char>(surfels.size())};
   executor.for_each(surfels.size(), [&](std::size_t i, unsigned) {
     const LightSampling sampling = rays_of_place(sky, rays);
     truth.values[i] = light.at(surfels[i], sampling, i);
@@ -110,12 +108,9 @@ Truth make_truth(const MeshLight& light, std::span<const Surfel> surfels, bool s
         high = std::max(high, value);
       }
     }
-    away[i] = high - low <= 0.05 * high || high == 0;
+    truth.away[i] = high - low <= 0.05 * high || high == 0;
   });
-  for (std::size_t i = 0; i < surfels.size(); ++i) {
-    truth.away[i] = away[i] != 0;
-    truth.mean += truth.values[i] / static_cast<double>(surfels.size());
-  }
+  for (const double value : truth.values) truth.mean += value / static_cast<double>(surfels.size());
   return truth;
 }
 
@@ -198,7 +193,6 @@ std::vector<RelightRow> measure_relight(const SceneChoice& choice, const Relight
     struct Setting {
       std::string name;
       LightRequest request;
-      unsigned rays = 0;
     };
     std::vector<Setting> settings;
     LightRequest request{{.scene = built.path(), .run = run}};
@@ -210,7 +204,7 @@ std::vector<RelightRow> measure_relight(const SceneChoice& choice, const Relight
       settings.push_back({"default", request});
     } else {
       for (const unsigned rays : options.sun_rays) {
-        settings.push_back({fmt::format("{} rays", rays), request, rays});
+        settings.push_back({fmt::format("{} rays", rays), request});
         settings.back().request.light_sampling.sun_rays = rays;
       }
     }
