@@ -447,6 +447,28 @@ TEST_CASE("relight: without lights the inputs' own shine, and without any the ru
   CHECK_FALSE(std::filesystem::exists(dir / "none.ptcx"));
 }
 
+TEST_CASE("relight: a picture shows the sky on backs of lit surfels, too",
+          "[integration][relight]") {
+  const TemporaryDirectory dir;
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {-1, 0, -1}, {0, 0, 2}, {2, 0, 0}, 0.05, glm::vec3(0));
+  for (Surfel& s : surfels) s.albedo = glm::vec3(0.5F);
+  write_scene(dir / "plane.ptcx", surfels);
+  LightRig rig;
+  rig.sky.radiance = glm::vec3(1);
+  relight(dir / "plane.ptcx", dir / "lit.ptcx", rig);
+  for (const double height : {1.0, -1.0}) {
+    RenderRequest picture{{.scene = dir / "lit.ptcx"}};
+    picture.camera =
+        Camera{.position = {0.1, height, 0}, .look_at = {0, 0, 0}, .width = 32, .height = 32};
+    picture.samples = 1;
+    Progress silent;
+    const PictureTarget target{.path = dir / "picture.exr"};
+    render_picture(picture, std::span(&target, 1), silent);
+    CHECK(read_image(dir / "picture.exr").at(16, 16).g == Approx(0.5F).epsilon(0.02));
+  }
+}
+
 TEST_CASE("relight: very many rays of a surfel are traced in parts", "[integration][relight]") {
   const TemporaryDirectory dir;
   std::vector<Surfel> surfels;

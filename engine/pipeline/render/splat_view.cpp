@@ -121,10 +121,11 @@ class SurfelView : public PrimaryView {
                    .lift = lift_height(decode_ufloat16(s.payload.radius),
                                        std::max(lift_, 0.125F * s.payload.rise), frame_),
                    .offset_normal = normal,
-                   .sky_included = sky_included_};
+                   .sky_included = sky_included_ && !back};
     for (int c = 0; c < 3; ++c) {
       hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
     }
+    // The radiance is that of the front; a back has only what is gathered at it
     if (!back) hit.direct = glm::vec3(radiance[0], radiance[1], radiance[2]);
     return hit;
   }
