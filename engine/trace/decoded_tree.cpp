@@ -9,68 +9,52 @@
 namespace ptc {
 namespace {
 
-// Places of the tables: what the rays of one origin open, mostly.
+// Places of the tables, which a core's own cache holds. More of them, up to 64,000, do not pay
 constexpr std::size_t kGroupPlaces = 1024, kLeafPlaces = 1024;
-static_assert(kGroupPlaces * (sizeof(TraceGroup) + 16) + kLeafPlaces * (sizeof(TraceLeaf) + 16) <=
+static_assert(kGroupPlaces * (sizeof(TraceGroup) + 8) + kLeafPlaces * (sizeof(TraceLeaf) + 8) <=
               DecodedTree::kBytes);
 
 }  // namespace
 
-DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, Sides sides)
+DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, Sides sides, float rim)
     : scene_(view, cache),
-      starts_{.lengths = view.scale().length_factors(), .sides = sides},
+      rules_{.lengths = view.scale().length_factors(), .sides = sides, .rim = rim},
       groups_(kGroupPlaces),
       leaves_(kLeafPlaces) {}
 
-glm::dvec3 DecodedTree::lattice(const glm::dvec3& position) const {
+glm::dvec3 DecodedTree::place(const glm::dvec3& position) const {
   const Frame& frame = view().frame();
   const glm::dvec3 low(frame.origin[0], frame.origin[1], frame.origin[2]);
-  // Keep far origins within what floats can square.
-  glm::dvec3 place;
+  glm::dvec3 at;
   for (int k = 0; k < 3; ++k) {
-    place[k] = std::clamp(view().scale().length(position[k] - low[k]), -SceneScale::kMaxDistance,
-                          SceneScale::kMaxDistance) /
-               SceneScale::kLatticeUnit;
+    at[k] = std::clamp(view().scale().length(position[k] - low[k]), -SceneScale::kMaxDistance,
+                       SceneScale::kMaxDistance) /
+            SceneScale::kLatticeUnit;
   }
-  return place;
-}
-
-bool DecodedTree::begin(const glm::dvec3& origin, const glm::vec3& axis) {
-  const glm::dvec3 place = lattice(origin);
-  if (!starts_.around && place == starts_.origin && axis == starts_.axis) return false;
-  starts_.origin = place;
-  starts_.axis = axis;
-  starts_.around = false;
-  starts_.reach = 0;
-  groups_.clear();
-  leaves_.clear();
-  return true;
-}
-
-void DecodedTree::begin_around(const glm::dvec3& origin, float reach) {
-  starts_.origin = lattice(origin);
-  starts_.axis = glm::vec3(0);
-  starts_.around = true;
-  starts_.reach = reach;
-  groups_.clear();
-  leaves_.clear();
+  return at;
 }
 
 void DecodedTree::decode_group(std::uint64_t reference, TraceGroup& into) {
   const ChildRef ref = decode_reference(reference, true);
   const PinnedGroup found = scene_.group(ref.page, ref.slot);
-  decode_boxes(*found, starts_, into);
+  decode_boxes(*found, rules_, into);
 }
 
 void DecodedTree::decode_leaf(std::uint64_t first, std::uint32_t count, TraceLeaf& into) {
   // Append the points of each page that holds some of the run.
   const std::uint32_t per_page = view().points_per_page();
-  into.size = 0;
+  into.size = count;
   for (std::uint32_t done = 0; done < count;) {
     const auto at = static_cast<std::uint32_t>((first + done) % per_page);
     const std::uint32_t number = std::min(count - done, per_page - at);
     const PageGuard page = scene_.points(first + done);
-    decode_discs(page.payload(), page.record_count(), at, number, done, starts_, into);
+    if (done == 0) {
+      const PointPage points(page.payload(), page.record_count(), view().point_bytes());
+      const LatticePoint anchor = points.position(at);
+      for (int k = 0; k < 3; ++k)
+        into.anchor[k] = static_cast<double>(anchor[static_cast<std::size_t>(k)]);
+    }
+    decode_discs(page.payload(), page.record_count(), at, number, done, rules_, into);
     done += number;
   }
 }

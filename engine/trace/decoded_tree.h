@@ -1,4 +1,4 @@
-// The octree of a container as rays from one origin see it.
+// The octree of a container as rays see it.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 
 namespace ptc {
 
-/// Decodes groups and leaves when they are first asked for, and keeps what was decoded last. So a
-/// page is mostly looked up once for each group that rays of an origin open, not once for each ray.
+/// Decodes groups and leaves when they are first asked for, and keeps what was decoded last. What
+/// lies far from a ray's beginning is met from many places, so it is seldom decoded anew.
 ///
 /// Threads: one for each thread.   Memory: kBytes.
 class DecodedTree {
@@ -22,19 +22,12 @@ class DecodedTree {
 
   /// @param view, cache  must outlive this; of the same container
   /// @param sides        which sides of discs stop rays
-  DecodedTree(const SceneView& view, PageCache& cache, Sides sides);
+  /// @param rim          radius of discs over their own, 1 or kRim
+  DecodedTree(const SceneView& view, PageCache& cache, Sides sides, float rim);
 
-  /// Chooses where rays start, and forgets what was decoded for another place.
-  /// @param origin  scene units
-  /// @param axis    unit; all rays have directions d with d . axis >= 0, and discs that lie
-  ///                wholly below that horizon are left out
-  /// @return        false when rays started there already, so that all is as it was
-  bool begin(const glm::dvec3& origin, const glm::vec3& axis);
-  /// Chooses a place around which rays of any direction start.
-  /// @param origin  scene units
-  /// @param reach   how far from there they start at most, edges
-  void begin_around(const glm::dvec3& origin, float reach);
-
+  /// Returns a place in lattice units, within what floats can square.
+  /// @param position  scene units
+  [[nodiscard]] glm::dvec3 place(const glm::dvec3& position) const;
   /// Returns a group.
   /// @param reference  of an interior node, as it is stored (spec/nodes.md#node-group)
   /// @throws FormatError when it leads to no group, or its page is damaged
@@ -56,15 +49,14 @@ class DecodedTree {
   [[nodiscard]] glm::vec3 outgoing(std::uint64_t point, bool emission);
 
   [[nodiscard]] const SceneView& view() const noexcept { return scene_.view(); }
-  [[nodiscard]] Sides sides() const noexcept { return starts_.sides; }
+  [[nodiscard]] const TraceRules& rules() const noexcept { return rules_; }
 
  private:
-  [[nodiscard]] glm::dvec3 lattice(const glm::dvec3& position) const;
   void decode_group(std::uint64_t reference, TraceGroup& into);
   void decode_leaf(std::uint64_t first, std::uint32_t count, TraceLeaf& into);
 
   SceneReader scene_;
-  RayStarts starts_;
+  TraceRules rules_;
   DecodedTable<TraceGroup> groups_;
   DecodedTable<TraceLeaf> leaves_;
 };

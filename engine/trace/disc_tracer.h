@@ -17,9 +17,10 @@ namespace ptc {
 /// Most of a ray's way down the tree lies near its origin, and is the same for all rays of a
 /// receiver. So these begin at a list of boxes, once for a receiver: what is larger than its
 /// distance is opened, and what lies below the horizon is left out. Tiles of neighbouring rays
-/// narrow the list to what they can meet:
+/// narrow the list to what they can meet, and a few of each tile do so again:
 ///
-///     tree  -- once a receiver -->  some 200 boxes  -- once a tile -->  some 80  -->  rays
+///     tree  -- once a receiver -->  some 200 boxes  -- once a tile -->  some 80  -- 4 times -->
+///     rays
 ///
 /// What a ray meets depends on the ray alone: not on the cap, the threads, the order of pages or
 /// the other rays.
@@ -29,6 +30,8 @@ class DiscTracer {
  public:
   /// Rays that share a narrowed list: neighbours are best.
   static constexpr std::size_t kTile = 32;
+  /// Rays of a tile that share a list narrowed once more.
+  static constexpr std::size_t kFew = 8;
   /// Memory of a tracer, bytes.
   static constexpr std::uint64_t kBytes = DecodedTree::kBytes + (std::uint64_t{1} << 18);
 
@@ -63,11 +66,13 @@ class DiscTracer {
   [[nodiscard]] bool is_empty(const ChildRef& leaf);
 
   DecodedTree tree_;
+  glm::dvec3 place_{0};  ///< where rays begin, lattice units
+  glm::vec3 axis_{0};
   std::vector<ListedBox> items_;
   std::vector<std::uint64_t> opened_;  ///< references of groups to look at
   std::vector<std::uint64_t> words_;   ///< references of the list's boxes
-  BoxList list_, tile_;
-  bool listed_ = false;  ///< whether the list is whole
+  BoxList list_, tile_, few_;
+  bool listed_ = false;  ///< whether the list is whole, and belongs to place_ and axis_
 };
 
 }  // namespace ptc

@@ -88,7 +88,7 @@ std::optional<Shaft> shaft_around(std::span<const ShadowRay> rays,
 }  // namespace
 
 ShadowTracer::ShadowTracer(const SceneView& view, PageCache& cache, Sides sides)
-    : tree_(view, cache, sides) {}
+    : tree_(view, cache, sides, kRim) {}
 
 void ShadowTracer::list_from_root() {
   words_.clear();
@@ -97,10 +97,9 @@ void ShadowTracer::list_from_root() {
   list_.size = 0;
   if (!root.interior) return;
   // One box that holds everything
-  ListedBox all{.distance = 0,
-                .columns = {},
-                .reference = root.page | std::uint64_t{root.slot} << 32,
-                .interior = true};
+  ListedBox all;
+  all.reference = root.page | std::uint64_t{root.slot} << 32;
+  all.interior = true;
   constexpr float kFar = 0x1p100F;
   for (std::size_t k = 0; k < 3; ++k) {
     all.columns[kLowX + k] = -kFar;
@@ -125,21 +124,17 @@ void ShadowTracer::list_along(const Shaft& shaft) {
   for (std::size_t next = 0; next < opened_.size(); ++next) {
     limit.take_group();
     const TraceGroup& group = tree_.group(opened_[next]);
-    const unsigned met = meet_shaft(group, shaft, near);
+    const Beginning from(place_, group.anchor);
+    const unsigned met = meet_shaft(group, from, shaft, near);
     for (std::size_t i = 0; i < kTraceLanes; ++i) {
       if ((met >> i & 1) == 0) continue;
-      const bool interior = (group.interior >> i & 1) != 0;
-      float extent = 0;
-      for (std::size_t k = 0; k < 3; ++k)
-        extent = std::max(extent, group.columns[kHighX + k][i] - group.columns[kLowX + k][i]);
+      ListedBox item(group, i, from);
       const std::size_t planned = items_.size() + (opened_.size() - next) * kTraceLanes;
-      if (interior && extent > width && planned < BoxList::kCapacity - kTraceLanes) {
-        opened_.push_back(group.child[i]);
+      if (item.interior && item.extent() > width && planned < BoxList::kCapacity - kTraceLanes) {
+        opened_.push_back(item.reference);
         continue;
       }
-      ListedBox item{
-          .distance = near[i], .columns = {}, .reference = group.child[i], .interior = interior};
-      for (std::size_t k = 0; k < kBoxColumns; ++k) item.columns[k] = group.columns[k][i];
+      item.distance = near[i];
       items_.push_back(item);
     }
   }
@@ -155,7 +150,7 @@ void ShadowTracer::trace_beam(std::span<const ShadowRay> rays, std::span<const s
   } else {
     list_from_root();
   }
-  trace_shadows(tree_, list_, words_, rays, beam, hidden);
+  trace_shadows(tree_, place_, list_, words_, rays, beam, hidden);
 }
 
 void ShadowTracer::test(std::span<const ShadowRay> rays, std::span<std::uint8_t> hidden) {

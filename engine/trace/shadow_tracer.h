@@ -37,10 +37,9 @@ class ShadowTracer {
   /// @param sides        which sides of discs stop rays
   ShadowTracer(const SceneView& view, PageCache& cache, Sides sides);
 
-  /// Chooses the place around which the next rays start.
-  /// @param origin  scene units
-  /// @param reach   how far from there they start at most, edges of the frame
-  void begin(const glm::dvec3& origin, float reach) { tree_.begin_around(origin, reach); }
+  /// Chooses the place around which the next rays begin.
+  /// @param position  scene units
+  void begin(const glm::dvec3& position) { place_ = tree_.place(position); }
 
   /// Tests rays. Those that follow one another should start at neighbouring places.
   /// @param hidden  for each ray: gets 1 when a disc lies before its end, else 0
@@ -54,6 +53,7 @@ class ShadowTracer {
   void list_along(const Shaft& shaft);
 
   DecodedTree tree_;
+  glm::dvec3 place_{0};               ///< around which rays begin, lattice units
   std::vector<std::uint32_t> order_;  ///< indices of rays, by direction
   std::vector<std::uint32_t> keys_;   ///< of the rays, which order them
   std::vector<ListedBox> items_;

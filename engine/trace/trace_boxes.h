@@ -1,6 +1,8 @@
-// What rays from one origin meet on their way down the tree, decoded once for all of them.
+// What rays meet on their way down the tree, decoded once for many of them.
 //
-// All lengths are in edges of the frame and relative to the origin. A box is bounded by four pairs
+// All lengths are in edges of the frame. What belongs to one group or run of points is relative to
+// an anchor near it, so that it serves rays from anywhere and floats lose nothing far from the
+// frame's corner. A box is bounded by four pairs
 // of planes: across x, y and z, and across the mean normal of what is in it, because surfaces are
 // thin and seldom lie along an axis:
 //
@@ -14,14 +16,16 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <new>
+#include <type_traits>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include "engine/base/memory.h"
 #include "engine/shade/scene_scale.h"
 #include "engine/shade/shading.h"
 
@@ -31,17 +35,15 @@ namespace ptc {
 /// walls leave slivers free, through which a sun would shine everywhere in it.
 inline constexpr float kRim = 1.2F;
 
-/// Where the rays start for which a tree is decoded: at one place, or around it.
-struct RayStarts {
-  glm::dvec3 origin{0};               ///< lattice units
-  glm::vec3 axis{0};                  ///< discs below the horizon of this normal are left out
+/// What a tree is decoded for.
+struct TraceRules {
   SceneScale::Factors lengths{1, 1};  ///< convert lengths from scene units to edges
-  Sides sides = Sides::both;          ///< which sides stop rays
-  /// Shadow rays start around the origin: each finds itself which backs are clear, and discs have a
-  /// rim of kRim.
-  bool around = false;
-  float reach = 0;  ///< how far from the origin rays start at most, edges
+  Sides sides = Sides::both;          ///< which sides of discs stop rays
+  float rim = 1;                      ///< radius of discs over their own, 1 or kRim
 };
+
+/// Share of a length that rounding may take from it where lengths are added up in floats.
+inline constexpr float kTraceRounding = 4e-7F;
 
 /// Boxes or discs that a kernel tests at once, at most.
 inline constexpr std::size_t kTraceLanes = 8;
@@ -68,39 +70,83 @@ enum BoxColumn : std::size_t {
 struct alignas(64) TraceGroup {
   float columns[kBoxColumns][kTraceLanes];
   std::uint64_t child[kTraceLanes];  ///< references, as in the group (spec/nodes.md#node-group)
+  glm::dvec3 anchor;                 ///< what the boxes are relative to, lattice units
   unsigned interior;                 ///< bit i: child i has a group
   unsigned children;                 ///< bit i: child i exists
 };
 
-/// A run of up to kTraceDiscs points. Discs that no ray from the origin can meet are left out.
-struct alignas(64) TraceLeaf {
-  float x[kTraceDiscs], y[kTraceDiscs], z[kTraceDiscs];     ///< centre
-  float nx[kTraceDiscs], ny[kTraceDiscs], nz[kTraceDiscs];  ///< normal
-  float height[kTraceDiscs];         ///< centre . normal; negative where the origin sees the front
-  float radius2[kTraceDiscs];        ///< square of the radius
-  float bump[kTraceDiscs];           ///< kBump over the radius
-  std::uint8_t number[kTraceDiscs];  ///< of the disc in the run
-  unsigned size;                     ///< discs that are left
+/// The discs of kTraceLanes points.
+struct alignas(64) TraceDiscs {
+  float x[kTraceLanes], y[kTraceLanes], z[kTraceLanes];     ///< centre
+  float nx[kTraceLanes], ny[kTraceLanes], nz[kTraceLanes];  ///< normal
+  float radius2[kTraceLanes];  ///< square of the radius; negative where a point has no disc
+  float bump[kTraceLanes];     ///< kBump over the radius
 };
 
-/// Boxes that many rays share, by ascending distance from the origin.
+/// A run of up to kTraceDiscs points.
+struct alignas(64) TraceLeaf {
+  TraceDiscs discs[kTraceDiscs / kTraceLanes];
+  glm::dvec3 anchor;  ///< what the discs are relative to, lattice units
+  unsigned size;      ///< number of points
+};
+
+/// Where a ray begins, as something decoded sees it.
+struct Beginning {
+  float at[3];  ///< relative to the anchor, edges
+  float slack;  ///< what rounding may take from distances to there, edges
+
+  /// @param place, anchor  lattice units
+  Beginning(const glm::dvec3& place, const glm::dvec3& anchor) noexcept {
+    float sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      at[k] = static_cast<float>((place[k] - anchor[k]) * SceneScale::kLatticeUnit);
+      sum += std::abs(at[k]);
+    }
+    slack = kTraceRounding * sum;
+  }
+};
+
+/// Boxes that many rays share, by ascending distance from a place near which the rays begin.
 ///
 /// Memory: 52 bytes for each of kCapacity boxes.
 struct BoxList {
   static constexpr std::size_t kCapacity = 512;
+  static constexpr std::size_t kStride = kCapacity + kTraceLanes;  ///< floats of a column
 
-  float columns[kBoxColumns][kCapacity + kTraceLanes];
-  float distance[kCapacity + kTraceLanes];        ///< of the nearest point of the box
-  std::uint32_t number[kCapacity + kTraceLanes];  ///< index into the words of the whole list
+  float columns[kBoxColumns][kStride];
+  float distance[kStride];        ///< of the nearest point of the box
+  std::uint32_t number[kStride];  ///< index into the words of the whole list
   std::size_t size = 0;
 };
 
 /// A box on its way to a list.
 struct ListedBox {
-  float distance;  ///< of its nearest point, before which no ray enters it
-  float columns[kBoxColumns];
-  std::uint64_t reference;
-  bool interior;
+  float distance = 0;  ///< of its nearest point, before which no ray enters it
+  float columns[kBoxColumns] = {};
+  std::uint64_t reference = 0;
+  bool interior = false;
+
+  ListedBox() = default;
+  /// Takes child i of a group, with bounds relative to where the rays begin.
+  ListedBox(const TraceGroup& group, std::size_t i, const Beginning& from) noexcept
+      : reference(group.child[i]), interior((group.interior >> i & 1) != 0) {
+    float along = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      columns[kLowX + k] = group.columns[kLowX + k][i] - from.at[k] - from.slack;
+      columns[kHighX + k] = group.columns[kHighX + k][i] - from.at[k] + from.slack;
+      columns[kSlabX + k] = group.columns[kSlabX + k][i];
+      along += columns[kSlabX + k] * from.at[k];
+    }
+    columns[kSlabLow] = group.columns[kSlabLow][i] - along - from.slack;
+    columns[kSlabHigh] = group.columns[kSlabHigh][i] - along + from.slack;
+  }
+  /// Returns the longest edge of the box.
+  [[nodiscard]] float extent() const noexcept {
+    float longest = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      longest = std::max(longest, columns[kHighX + k] - columns[kLowX + k]);
+    return longest;
+  }
 };
 
 /// Sorts boxes and makes a list of them.
@@ -128,31 +174,32 @@ class DecodedTable {
  public:
   /// @param places  a power of two
   explicit DecodedTable(std::size_t places)
-      : keys_(places, Key{}), values_(std::make_unique<Value[]>(places)) {}
+      : keys_(places, kNothing),
+        bytes_(places * sizeof(Value)),
+        values_(new (bytes_.data()) Value[places]) {}
 
-  /// Forgets everything.
-  void clear() noexcept { ++turn_; }
   /// Returns what belongs to a key.
   /// @param decode  decode(value) fills the value when the table does not have it
   template <class Decode>
   const Value& find(std::uint64_t key, const Decode& decode) {
     const std::size_t at = (key * 0x9e3779b97f4a7c15U >> 32) & (keys_.size() - 1);
-    if (keys_[at].turn != turn_ || keys_[at].key != key) {
-      keys_[at].turn = 0;  // so that nothing half decoded is found where decoding fails
+    if (keys_[at] != key) {
+      keys_[at] = kNothing;  // so that nothing half decoded is found where decoding fails
       decode(values_[at]);
-      keys_[at] = {key, turn_};
+      keys_[at] = key;
     }
     return values_[at];
   }
 
  private:
-  struct Key {
-    std::uint64_t key = 0;
-    std::uint64_t turn = 0;  ///< 0: nothing
-  };
-  std::vector<Key> keys_;
-  std::unique_ptr<Value[]> values_;
-  std::uint64_t turn_ = 1;
+  static constexpr std::uint64_t kNothing = ~std::uint64_t{0};  ///< no reference, and no run
+
+  static_assert(std::is_trivially_default_constructible_v<Value> &&
+                std::is_trivially_destructible_v<Value>);
+
+  std::vector<std::uint64_t> keys_;
+  Arena bytes_;  ///< in huge pages, because places that are near in time lie anywhere
+  Value* values_;
 };
 
 }  // namespace ptc

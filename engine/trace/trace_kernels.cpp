@@ -34,9 +34,8 @@ constexpr float kLeastSlope = 1e-20F;      ///< least |d_k| that a ray is divide
 constexpr float kLeastSlabSlope = 1e-12F;  ///< least |d . n| that a ray is divided by
 constexpr float kSlack = 1 + 2e-6F;        ///< what rounding may take from a quotient
 
-/// A ray that begins at the origin.
+/// A ray.
 struct Ray {
-  static constexpr bool kOffset = false;
   glm::vec3 along;
   float inverse[3];  ///< 1 over each component
   bool negative[3];
@@ -49,30 +48,21 @@ struct Ray {
   }
 };
 
-/// A ray that begins beside the origin.
-struct OffsetRay : Ray {
-  static constexpr bool kOffset = true;
-  glm::vec3 from;
-  Sides sides;  ///< which sides stop the ray
-
-  OffsetRay(const ShadowRay& ray, Sides stopping)
-      : Ray(ray.direction), from(ray.origin), sides(stopping) {}
-};
-
 /// Tests up to kTraceLanes boxes.
 /// @param columns  of the boxes, `stride` floats from one column to the next
+/// @param from     where the ray begins, as the boxes see it; null: where they are relative to
 /// @param far      the depth that the ray has met something at
 /// @param near     receives the depth at which the ray enters each box
 /// @return         bit i: the ray may meet something in box i
-template <class R>
-HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const R& ray, float far,
-                               float* near) {
+template <bool kOffset>
+HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const Ray& ray,
+                               const Beginning* from, float far, float* near) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   unsigned met = 0;
-  for (unsigned from = 0; from < kTraceLanes; from += lanes) {
+  for (unsigned at = 0; at < kTraceLanes; at += lanes) {
     const auto load = [&](std::size_t column) {
-      return hn::LoadU(f, columns + column * stride + from);
+      return hn::LoadU(f, columns + column * stride + at);
     };
     auto enter = hn::Zero(f), leave = hn::Set(f, far);
     for (std::size_t k = 0; k < 3; ++k) {
@@ -80,10 +70,10 @@ HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const R
       const std::size_t first = ray.negative[k] ? kHighX : kLowX,
                         last = ray.negative[k] ? kLowX : kHighX;
       auto a = load(first + k), b = load(last + k);
-      if constexpr (R::kOffset) {
-        const auto begin = hn::Set(f, ray.from[static_cast<int>(k)]);
-        a = hn::Sub(a, begin);
-        b = hn::Sub(b, begin);
+      if constexpr (kOffset) {
+        const float outwards = ray.negative[k] ? -from->slack : from->slack;
+        a = hn::Sub(a, hn::Set(f, from->at[k] + outwards));
+        b = hn::Sub(b, hn::Set(f, from->at[k] - outwards));
       }
       enter = hn::Max(enter, hn::Mul(a, by));
       leave = hn::Min(leave, hn::Mul(b, by));
@@ -94,49 +84,79 @@ HWY_INLINE unsigned meet_boxes(const float* columns, std::size_t stride, const R
         hn::Div(hn::Set(f, 1.0F),
                 hn::CopySign(hn::Max(hn::Abs(slope), hn::Set(f, kLeastSlabSlope)), slope));
     auto low = load(kSlabLow), high = load(kSlabHigh);
-    if constexpr (R::kOffset) {
-      const auto begin = dot(slab, spread(ray.from));
-      low = hn::Sub(low, begin);
-      high = hn::Sub(high, begin);
+    if constexpr (kOffset) {
+      const auto begin = dot(slab, spread({from->at[0], from->at[1], from->at[2]})),
+                 slack = hn::Set(f, from->slack);
+      low = hn::Sub(low, hn::Add(begin, slack));
+      high = hn::Sub(high, hn::Sub(begin, slack));
     }
     const auto a = hn::Mul(low, by), b = hn::Mul(high, by);
     enter = hn::Max(enter, hn::Min(a, b));
     leave = hn::Min(leave, hn::Max(a, b));
-    hn::StoreU(enter, f, near + from);
-    met |= bits_of(f, hn::Le(enter, hn::Mul(leave, hn::Set(f, kSlack)))) << from;
+    hn::StoreU(enter, f, near + at);
+    met |= bits_of(f, hn::Le(enter, hn::Mul(leave, hn::Set(f, kSlack)))) << at;
   }
   return met;
+}
+
+/// Discs that a ray meets: lanes of a vector.
+struct MetDiscs {
+  VF depth;   ///< bumped depth along the ray
+  VF height;  ///< centre . normal; negative where the ray meets the front
+  MF met;
+};
+
+/// Tests a vector of discs of a leaf. Backs within two of their own radii of where the ray begins
+/// are clear, or all backs are.
+/// @param at   number of the first disc
+/// @param far  depth beyond which discs do not count
+HWY_INLINE MetDiscs meet_discs(const TraceLeaf& leaf, unsigned at, const Beginning& from,
+                               const Ray& ray, const TraceRules& rules, float far) {
+  const F f;
+  const TraceDiscs& discs = leaf.discs[at / kTraceLanes];
+  const auto load = [&](const float* column) { return hn::Load(f, column + at % kTraceLanes); };
+  const Vec along = spread(ray.along);
+  const Vec to{hn::Sub(load(discs.x), hn::Set(f, from.at[0])),
+               hn::Sub(load(discs.y), hn::Set(f, from.at[1])),
+               hn::Sub(load(discs.z), hn::Set(f, from.at[2]))};
+  const Vec normal{load(discs.nx), load(discs.ny), load(discs.nz)};
+  const auto height = dot(to, normal), radius2 = load(discs.radius2);
+  const auto t = hn::Div(height, dot(normal, along));
+  const Vec off{hn::MulSub(along.x, t, to.x), hn::MulSub(along.y, t, to.y),
+                hn::MulSub(along.z, t, to.z)};
+  const auto off2 = dot(off, off);
+  const auto depth = hn::MulAdd(load(discs.bump), off2, t);
+  auto met = hn::And(hn::Le(off2, radius2), hn::Gt(t, hn::Zero(f)));
+  met = hn::And(met, hn::Le(depth, hn::Set(f, far)));
+  auto clear = hn::Ge(height, hn::Zero(f));
+  if (rules.sides == Sides::both) {
+    const auto reach2 = hn::Mul(hn::Set(f, 4 / (rules.rim * rules.rim)), radius2);
+    clear = hn::And(clear, hn::Lt(dot(to, to), reach2));
+  }
+  return {depth, height, hn::And(hn::AndNot(clear, met), hn::FirstN(f, leaf.size - at))};
 }
 
 /// Tests the discs of a leaf.
 /// @param first  number of its first point
 /// @return       whether the ray met one that is nearer than `hit`, which it replaces
-HWY_INLINE bool meet_discs(const TraceLeaf& leaf, std::uint64_t first, const Ray& ray,
-                           RaysFor wanted, RayHit& hit) {
+HWY_INLINE bool meet_nearest(const TraceLeaf& leaf, std::uint64_t first, const Beginning& from,
+                             const Ray& ray, const TraceRules& rules, RaysFor wanted, RayHit& hit) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
-  const Vec along = spread(ray.along);
   bool met = false;
-  for (unsigned from = 0; from < leaf.size; from += lanes) {
-    const auto load = [&](const float* column) { return hn::Load(f, column + from); };
-    const auto height = load(leaf.height);
-    const auto t = hn::Div(height, dot({load(leaf.nx), load(leaf.ny), load(leaf.nz)}, along));
-    const Vec off{hn::MulSub(along.x, t, load(leaf.x)), hn::MulSub(along.y, t, load(leaf.y)),
-                  hn::MulSub(along.z, t, load(leaf.z))};
-    const auto off2 = dot(off, off);
-    const auto depth = hn::MulAdd(load(leaf.bump), off2, t);
-    auto inside = hn::And(hn::Le(off2, load(leaf.radius2)), hn::Gt(t, hn::Zero(f)));
-    inside = hn::And(inside, hn::Le(depth, hn::Set(f, hit.depth)));
-    unsigned bits = bits_of(f, hn::And(inside, hn::FirstN(f, leaf.size - from)));
+  for (unsigned at = 0; at < leaf.size; at += lanes) {
+    const MetDiscs discs = meet_discs(leaf, at, from, ray, rules, hit.depth);
+    unsigned bits = bits_of(f, discs.met);
     if (bits == 0) continue;
-    alignas(64) float depths[kTraceLanes];
-    hn::Store(depth, f, depths);
+    alignas(64) float depths[kTraceLanes], heights[kTraceLanes];
+    hn::Store(discs.depth, f, depths);
+    hn::Store(discs.height, f, heights);
     for (; bits != 0; bits &= bits - 1) {
       const auto i = static_cast<unsigned>(std::countr_zero(bits));
       // Of discs at one depth take that of the first point, in whichever order they are met
-      const std::uint64_t point = first + leaf.number[from + i];
+      const std::uint64_t point = first + at + i;
       if (depths[i] > hit.depth || (depths[i] == hit.depth && point > hit.point)) continue;
-      hit = {depths[i], leaf.height[from + i] >= 0, point};
+      hit = {depths[i], heights[i] >= 0, point};
       met = true;
       if (wanted == RaysFor::any) return true;
     }
@@ -144,31 +164,13 @@ HWY_INLINE bool meet_discs(const TraceLeaf& leaf, std::uint64_t first, const Ray
   return met;
 }
 
-/// Tests whether a ray that begins beside the origin meets a disc of a leaf within `length`. Backs
-/// within two of their radii of its beginning are clear.
-HWY_INLINE bool meet_discs(const TraceLeaf& leaf, const OffsetRay& ray, float length) {
+/// Tests whether a ray meets a disc of a leaf within `length`.
+HWY_INLINE bool meet_any(const TraceLeaf& leaf, const Beginning& from, const Ray& ray,
+                         const TraceRules& rules, float length) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
-  const Vec along = spread(ray.along), from = spread(ray.from);
   for (unsigned at = 0; at < leaf.size; at += lanes) {
-    const auto load = [&](const float* column) { return hn::Load(f, column + at); };
-    const Vec to{hn::Sub(load(leaf.x), from.x), hn::Sub(load(leaf.y), from.y),
-                 hn::Sub(load(leaf.z), from.z)};
-    const Vec normal{load(leaf.nx), load(leaf.ny), load(leaf.nz)};
-    const auto height = dot(to, normal), radius2 = load(leaf.radius2);
-    const auto t = hn::Div(height, dot(normal, along));
-    const Vec off{hn::MulSub(along.x, t, to.x), hn::MulSub(along.y, t, to.y),
-                  hn::MulSub(along.z, t, to.z)};
-    const auto off2 = dot(off, off);
-    const auto depth = hn::MulAdd(load(leaf.bump), off2, t);
-    auto hides = hn::And(hn::Le(off2, radius2), hn::Gt(t, hn::Zero(f)));
-    hides = hn::And(hides, hn::Le(depth, hn::Set(f, length)));
-    auto clear = hn::Ge(height, hn::Zero(f));
-    if (ray.sides == Sides::both) {
-      clear = hn::And(clear, hn::Lt(dot(to, to), hn::Mul(hn::Set(f, 4 / (kRim * kRim)), radius2)));
-    }
-    hides = hn::And(hn::AndNot(clear, hides), hn::FirstN(f, leaf.size - at));
-    if (!hn::AllFalse(f, hides)) return true;
+    if (!hn::AllFalse(f, meet_discs(leaf, at, from, ray, rules, length).met)) return true;
   }
   return false;
 }
@@ -204,12 +206,15 @@ class Stack {
 };
 
 /// Follows one ray.
-/// @param far        returns the depth beyond which the ray looks for nothing
-/// @param meet_leaf  looks at up to kTraceDiscs points, and returns whether the ray ends there:
-///                   meet_leaf(leaf, number of its first point)
-template <class R, class Far, class MeetLeaf>
+/// @param place       where the ray begins, lattice units
+/// @param meet_listed tests kTraceLanes boxes of the list: meet_listed(number of the first, near)
+/// @param far         returns the depth beyond which the ray looks for nothing
+/// @param meet_leaf   looks at up to kTraceDiscs points, and returns whether the ray ends there:
+///                    meet_leaf(leaf, number of its first point)
+template <class MeetListed, class Far, class MeetLeaf>
 HWY_INLINE void follow(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                       const R& ray, const Far& far, const MeetLeaf& meet_leaf) {
+                       const Ray& ray, const glm::dvec3& place, const MeetListed& meet_listed,
+                       const Far& far, const MeetLeaf& meet_leaf) {
   Stack stack;
   WalkLimit limit(tree.view());
   alignas(64) float near[kTraceLanes];
@@ -217,9 +222,7 @@ HWY_INLINE void follow(DecodedTree& tree, const BoxList& list, std::span<const s
     // Take the next boxes of the list
     if (stack.empty()) {
       if (at >= list.size || list.distance[at] > far()) return;
-      unsigned bits =
-          meet_boxes(list.columns[0] + at, BoxList::kCapacity + kTraceLanes, ray, far(), near);
-      bits &= (1U << std::min(list.size - at, kTraceLanes)) - 1;
+      unsigned bits = meet_listed(at, near) & ((1U << std::min(list.size - at, kTraceLanes)) - 1);
       stack.begin();
       for (; bits != 0; bits &= bits - 1) {
         const auto i = static_cast<unsigned>(std::countr_zero(bits));
@@ -238,7 +241,9 @@ HWY_INLINE void follow(DecodedTree& tree, const BoxList& list, std::span<const s
         tree.view().fail("spec/nodes.md#node-level",
                          "a path has more groups than there are levels");
       const TraceGroup& group = tree.group(next.reference);
-      unsigned bits = meet_boxes(group.columns[0], kTraceLanes, ray, far(), near) & group.children;
+      const Beginning from(place, group.anchor);
+      unsigned bits =
+          meet_boxes<true>(group.columns[0], kTraceLanes, ray, &from, far(), near) & group.children;
       stack.begin();
       for (; bits != 0; bits &= bits - 1) {
         const auto i = static_cast<unsigned>(std::countr_zero(bits));
@@ -257,19 +262,9 @@ HWY_INLINE void follow(DecodedTree& tree, const BoxList& list, std::span<const s
   }
 }
 
-void trace_ray(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-               const Ray& ray, RaysFor wanted, RayHit& hit) {
-  follow(
-      tree, list, words, ray, [&] { return hit.depth; },
-      [&](const TraceLeaf& leaf, std::uint64_t first) {
-        return meet_discs(leaf, first, ray, wanted, hit) && wanted == RaysFor::any;
-      });
-}
-
 }  // namespace
 
-void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into) {
-  // Find the cell of the group, relative to the origin
+void decode_boxes(const GroupView& group, const TraceRules& rules, TraceGroup& into) {
   const F f;
   const auto children = static_cast<unsigned>(group.size());
   into.children = (1U << children) - 1;
@@ -277,14 +272,8 @@ void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& i
   for (unsigned i = 0; i < children; ++i) into.child[i] = group.reference(static_cast<int>(i));
   const LatticePoint lattice = decode_morton(group.cell());
   const auto edge = static_cast<float>(cell_edge(group.level()) * SceneScale::kLatticeUnit);
-  float corner[3];
-  float size = 3 * edge + starts.reach;
-  for (int k = 0; k < 3; ++k) {
-    corner[k] = static_cast<float>(
-        (static_cast<double>(lattice[static_cast<std::size_t>(k)]) - starts.origin[k]) *
-        SceneScale::kLatticeUnit);
-    size += std::abs(corner[k]);
-  }
+  for (int k = 0; k < 3; ++k)
+    into.anchor[k] = static_cast<double>(lattice[static_cast<std::size_t>(k)]);
   // Bound each child by its octant, its sphere and its slab
   const auto unit = hn::Set(f, static_cast<float>(SceneScale::kLatticeUnit)),
              most = hn::Set(f, 2 * SceneScale::kMaxRadius);
@@ -301,13 +290,11 @@ void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& i
     const auto share = [&](int k) { return to_float(load_u16(group.facing(k) + at)); };
     auto radius = length(group.radius()), thickness = length(group.thickness()),
          greatest = length(group.greatest());
-    if (starts.around) {
-      // A rim is thicker than its disc only as far as that is tilted
-      const auto rim = hn::Mul(greatest, hn::Set(f, kRim - 1));
-      radius = hn::Add(radius, rim);
-      thickness = hn::Mul(thickness, hn::Set(f, kRim));
-      greatest = hn::Add(greatest, rim);
-    }
+    // A rim is thicker than its disc only as far as that is tilted
+    const auto wider = hn::Set(f, rules.rim - 1), rim = hn::Mul(greatest, wider);
+    radius = hn::Add(radius, rim);
+    thickness = hn::MulAdd(thickness, wider, thickness);
+    greatest = hn::Add(greatest, rim);
     Vec normal{hn::Sub(share(0), share(1)), hn::Sub(share(2), share(3)),
                hn::Sub(share(4), share(5))};
     const auto length2 = dot(normal, normal);
@@ -318,22 +305,21 @@ void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& i
               hn::IfThenElseZero(directed, normal.y), hn::IfThenElseZero(directed, normal.z)};
     const auto half = hn::IfThenElse(directed, thickness, radius);
     // Widen every bound by what rounding may take from it
-    const auto rounding =
-        hn::Mul(hn::Set(f, kRounding), hn::Add(radius, hn::Add(greatest, hn::Set(f, size))));
+    const auto rounding = hn::Mul(hn::Set(f, kTraceRounding),
+                                  hn::Add(radius, hn::Add(greatest, hn::Set(f, 3 * edge))));
     const VF normals[3] = {normal.x, normal.y, normal.z};
     const std::byte* const means[3] = {group.mean_x(), group.mean_y(), group.mean_z()};
     VF to[3];
     for (std::size_t k = 0; k < 3; ++k) {
       const auto steps = to_float(load_u16(means[k] + at));
-      const auto base = hn::Set(f, corner[k]), whole = hn::Set(f, edge),
-                 part = hn::Set(f, edge / 2);
-      to[k] = hn::MulAdd(steps, hn::Set(f, edge / static_cast<float>(kMeanSteps)), base);
+      const auto whole = hn::Set(f, edge), part = hn::Set(f, edge / 2);
+      to[k] = hn::Mul(steps, hn::Set(f, edge / static_cast<float>(kMeanSteps)));
       // Where the mean was rounded to the middle of the cell, the octant may be either. The one
       // child of a root that is a leaf has the whole cell
       const auto upper = hn::Gt(steps, hn::Set(f, low_half)),
                  lower = hn::Lt(steps, hn::Set(f, high_half));
-      const auto octant_low = hn::Add(base, hn::IfThenElseZero(upper, part)),
-                 octant_high = hn::Add(base, hn::IfThenElse(lower, part, whole));
+      const auto octant_low = hn::IfThenElseZero(upper, part),
+                 octant_high = hn::IfThenElse(lower, part, whole);
       // The sine between normal and axis, from the other two components, because 1 - n_k^2 cancels
       const VF n1 = normals[(k + 1) % 3], n2 = normals[(k + 2) % 3];
       const auto aside = hn::Sqrt(hn::MulAdd(n1, n1, hn::Mul(n2, n2)));
@@ -352,53 +338,71 @@ void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& i
 }
 
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into) {
+                  unsigned number, unsigned from, const TraceRules& rules, TraceLeaf& into) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   for (unsigned done = 0; done < number; done += lanes) {
-    const PageSurfels s = load_surfels(payload, count, first + done, starts.origin, starts.lengths);
-    // Leave out what is below the horizon, and backs that are clear
-    const auto height = dot(s.to, s.normal);
-    const auto back = hn::Ge(height, hn::Zero(f));
-    auto clear = back;
-    if (starts.around) {
-      clear = hn::Lt(s.radius, hn::Zero(f));  // each ray finds out itself
-    } else if (starts.sides == Sides::both) {
-      const auto reach2 = hn::Mul(hn::Set(f, 4.0F), hn::Mul(s.radius, s.radius));
-      clear = hn::And(back, hn::Lt(dot(s.to, s.to), reach2));
+    const PageSurfels s = load_surfels(payload, count, first + done, into.anchor, rules.lengths);
+    const auto radius = hn::Mul(s.radius, hn::Set(f, rules.rim));
+    const auto exists = hn::Gt(radius, hn::Zero(f));
+    const VF values[] = {s.to.x,
+                         s.to.y,
+                         s.to.z,
+                         s.normal.x,
+                         s.normal.y,
+                         s.normal.z,
+                         hn::IfThenElse(exists, hn::Mul(radius, radius), hn::Set(f, -1.0F)),
+                         hn::Div(hn::Set(f, kBump), s.radius)};
+    const auto columns = [&](unsigned at) {
+      TraceDiscs& discs = into.discs[at / kTraceLanes];
+      return std::array{discs.x,  discs.y,  discs.z,       discs.nx,
+                        discs.ny, discs.nz, discs.radius2, discs.bump};
+    };
+    const unsigned to = from + done;
+    if (to % lanes == 0) {
+      const std::array<float*, 8> begin = columns(to);
+      for (std::size_t k = 0; k < begin.size(); ++k)
+        hn::Store(values[k], f, begin[k] + to % kTraceLanes);
+      continue;
     }
-    const auto axis = spread(starts.axis);
-    const auto cosine = dot(s.normal, axis);
-    const Vec tilt{hn::NegMulAdd(cosine, axis.x, s.normal.x),
-                   hn::NegMulAdd(cosine, axis.y, s.normal.y),
-                   hn::NegMulAdd(cosine, axis.z, s.normal.z)};
-    const auto rise = hn::Mul(s.radius, hn::Sqrt(dot(tilt, tilt)));
-    const auto size = hn::Add(hn::Abs(s.to.x), hn::Add(hn::Abs(s.to.y), hn::Abs(s.to.z)));
-    const auto top =
-        hn::MulAdd(hn::Set(f, kRounding), hn::Add(size, s.radius), hn::Add(dot(s.to, axis), rise));
-    auto kept = hn::And(hn::Gt(s.radius, hn::Zero(f)), hn::Gt(top, hn::Zero(f)));
-    kept = hn::And(hn::AndNot(clear, kept), hn::FirstN(f, number - done));
-    // Append the rest
-    const auto rim = hn::Mul(s.radius, hn::Set(f, starts.around ? kRim : 1));
-    alignas(64) float columns[9][kTraceLanes];
-    const VF values[9] = {s.to.x,
-                          s.to.y,
-                          s.to.z,
-                          s.normal.x,
-                          s.normal.y,
-                          s.normal.z,
-                          height,
-                          hn::Mul(rim, rim),
-                          hn::Div(hn::Set(f, kBump), s.radius)};
-    for (int k = 0; k < 9; ++k) hn::Store(values[k], f, columns[k]);
-    float* const to[9] = {into.x,  into.y,      into.z,       into.nx,  into.ny,
-                          into.nz, into.height, into.radius2, into.bump};
-    for (unsigned bits = bits_of(f, kept); bits != 0; bits &= bits - 1) {
-      const auto i = static_cast<unsigned>(std::countr_zero(bits));
-      for (int k = 0; k < 9; ++k) to[k][into.size] = columns[k][i];
-      into.number[into.size++] = static_cast<std::uint8_t>(from + done + i);
+    // A run that goes on from one page to the next does so anywhere
+    for (std::size_t k = 0; k < std::size(values); ++k) {
+      alignas(64) float column[kTraceLanes];
+      hn::Store(values[k], f, column);
+      for (unsigned i = 0; i < std::min(number - done, lanes); ++i)
+        columns(to + i)[k][(to + i) % kTraceLanes] = column[i];
     }
   }
+}
+
+bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axis,
+              const TraceRules& rules) {
+  const F f;
+  const auto lanes = static_cast<unsigned>(hn::Lanes(f));
+  const Vec up = spread(axis);
+  for (unsigned at = 0; at < leaf.size; at += lanes) {
+    const TraceDiscs& discs = leaf.discs[at / kTraceLanes];
+    const auto load = [&](const float* column) { return hn::Load(f, column + at % kTraceLanes); };
+    const Vec to{hn::Sub(load(discs.x), hn::Set(f, from.at[0])),
+                 hn::Sub(load(discs.y), hn::Set(f, from.at[1])),
+                 hn::Sub(load(discs.z), hn::Set(f, from.at[2]))};
+    const Vec normal{load(discs.nx), load(discs.ny), load(discs.nz)};
+    const auto radius2 = load(discs.radius2);
+    auto clear = hn::Ge(dot(to, normal), hn::Zero(f));
+    if (rules.sides == Sides::both)
+      clear = hn::And(clear, hn::Lt(dot(to, to), hn::Mul(hn::Set(f, 4.0F), radius2)));
+    // The highest point of a disc is as far above its centre as it is tilted
+    const auto cosine = dot(normal, up);
+    const Vec tilt{hn::NegMulAdd(cosine, up.x, normal.x), hn::NegMulAdd(cosine, up.y, normal.y),
+                   hn::NegMulAdd(cosine, up.z, normal.z)};
+    const auto rise = hn::Sqrt(hn::Mul(hn::Max(radius2, hn::Zero(f)), dot(tilt, tilt)));
+    const auto top = hn::Add(hn::Add(dot(to, up), rise), hn::Set(f, from.slack));
+    const auto seen = hn::AndNot(clear, hn::Gt(top, hn::Zero(f)));
+    if (!hn::AllFalse(
+            f, hn::And(hn::And(seen, hn::Ge(radius2, hn::Zero(f))), hn::FirstN(f, leaf.size - at))))
+      return true;
+  }
+  return false;
 }
 
 void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into) {
@@ -451,42 +455,66 @@ void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, Bo
   }
 }
 
-void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits) {
-  for (std::size_t i = 0; i < directions.size(); ++i)
-    trace_ray(tree, list, words, Ray(directions[i]), wanted, hits[i]);
+void trace_rays(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                std::span<const std::uint64_t> words, std::span<const glm::vec3> directions,
+                RaysFor wanted, std::span<RayHit> hits) {
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const Ray ray(directions[i]);
+    RayHit& hit = hits[i];
+    follow(
+        tree, list, words, ray, place,
+        [&](std::size_t at, float* near) {
+          return meet_boxes<false>(list.columns[0] + at, BoxList::kStride, ray, nullptr, hit.depth,
+                                   near);
+        },
+        [&] { return hit.depth; },
+        [&](const TraceLeaf& leaf, std::uint64_t first) {
+          const Beginning from(place, leaf.anchor);
+          return meet_nearest(leaf, first, from, ray, tree.rules(), wanted, hit) &&
+                 wanted == RaysFor::any;
+        });
+  }
 }
 
-void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
-                   std::span<std::uint8_t> hidden) {
+void trace_shadows(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                   std::span<const std::uint64_t> words, std::span<const ShadowRay> rays,
+                   std::span<const std::uint32_t> chosen, std::span<std::uint8_t> hidden) {
   for (const std::uint32_t i : chosen) {
-    const OffsetRay ray(rays[i], tree.sides());
+    const Ray ray(rays[i].direction);
+    const glm::dvec3 begin = place + glm::dvec3(rays[i].origin) / SceneScale::kLatticeUnit;
+    const Beginning beside(begin, place);
     const float length = rays[i].length;
     hidden[i] = 0;
     follow(
-        tree, list, words, ray, [&] { return length; },
+        tree, list, words, ray, begin,
+        [&](std::size_t at, float* near) {
+          return meet_boxes<true>(list.columns[0] + at, BoxList::kStride, ray, &beside, length,
+                                  near);
+        },
+        [&] { return length; },
         [&](const TraceLeaf& leaf, std::uint64_t /*first*/) {
-          if (!meet_discs(leaf, ray, length)) return false;
+          if (!meet_any(leaf, Beginning(begin, leaf.anchor), ray, tree.rules(), length))
+            return false;
           hidden[i] = 1;
           return true;
         });
   }
 }
 
-unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near) {
+unsigned meet_shaft(const TraceGroup& group, const Beginning& from, const Shaft& shaft,
+                    float* near) {
   const F f;
   const auto lanes = static_cast<unsigned>(hn::Lanes(f));
   const Vec axes[3] = {spread(shaft.axes[0]), spread(shaft.axes[1]), spread(shaft.axes[2])};
   unsigned met = 0;
-  for (unsigned from = 0; from < kTraceLanes; from += lanes) {
+  for (unsigned first = 0; first < kTraceLanes; first += lanes) {
     // Project the boxes on the axes of the shaft
     VF middle[3], half[3];
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto low = hn::Load(f, group.columns[kLowX + k] + from),
-                 high = hn::Load(f, group.columns[kHighX + k] + from);
-      middle[k] = hn::Mul(hn::Set(f, 0.5F), hn::Add(low, high));
-      half[k] = hn::Mul(hn::Set(f, 0.5F), hn::Sub(high, low));
+      const auto low = hn::Load(f, group.columns[kLowX + k] + first),
+                 high = hn::Load(f, group.columns[kHighX + k] + first);
+      middle[k] = hn::MulSub(hn::Set(f, 0.5F), hn::Add(low, high), hn::Set(f, from.at[k]));
+      half[k] = hn::MulAdd(hn::Set(f, 0.5F), hn::Sub(high, low), hn::Set(f, from.slack));
     }
     VF low[3], high[3];
     for (int k = 0; k < 3; ++k) {
@@ -511,8 +539,8 @@ unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near) {
                                 hn::Max(hn::Mul(slope_high, enter), hn::Mul(slope_high, leave)));
       kept = hn::And(kept, hn::And(hn::Le(low[k], most), hn::Ge(high[k], least)));
     }
-    hn::StoreU(enter, f, near + from);
-    met |= bits_of(f, kept) << from;
+    hn::StoreU(enter, f, near + first);
+    met |= bits_of(f, kept) << first;
   }
   return met & group.children;
 }
@@ -525,37 +553,45 @@ namespace ptc {
 
 HWY_EXPORT(decode_boxes);
 HWY_EXPORT(decode_discs);
+HWY_EXPORT(has_disc);
 HWY_EXPORT(narrow_boxes);
 HWY_EXPORT(trace_rays);
 HWY_EXPORT(trace_shadows);
 HWY_EXPORT(meet_shaft);
 
-void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into) {
-  HWY_DYNAMIC_DISPATCH(decode_boxes)(group, starts, into);
+void decode_boxes(const GroupView& group, const TraceRules& rules, TraceGroup& into) {
+  HWY_DYNAMIC_DISPATCH(decode_boxes)(group, rules, into);
 }
 
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into) {
-  HWY_DYNAMIC_DISPATCH(decode_discs)(payload, count, first, number, from, starts, into);
+                  unsigned number, unsigned from, const TraceRules& rules, TraceLeaf& into) {
+  HWY_DYNAMIC_DISPATCH(decode_discs)(payload, count, first, number, from, rules, into);
+}
+
+bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axis,
+              const TraceRules& rules) {
+  return HWY_DYNAMIC_DISPATCH(has_disc)(leaf, from, axis, rules);
 }
 
 void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into) {
   HWY_DYNAMIC_DISPATCH(narrow_boxes)(from, directions, into);
 }
 
-void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits) {
-  HWY_DYNAMIC_DISPATCH(trace_rays)(tree, list, words, directions, wanted, hits);
+void trace_rays(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                std::span<const std::uint64_t> words, std::span<const glm::vec3> directions,
+                RaysFor wanted, std::span<RayHit> hits) {
+  HWY_DYNAMIC_DISPATCH(trace_rays)(tree, place, list, words, directions, wanted, hits);
 }
 
-void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
-                   std::span<std::uint8_t> hidden) {
-  HWY_DYNAMIC_DISPATCH(trace_shadows)(tree, list, words, rays, chosen, hidden);
+void trace_shadows(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                   std::span<const std::uint64_t> words, std::span<const ShadowRay> rays,
+                   std::span<const std::uint32_t> chosen, std::span<std::uint8_t> hidden) {
+  HWY_DYNAMIC_DISPATCH(trace_shadows)(tree, place, list, words, rays, chosen, hidden);
 }
 
-unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near) {
-  return HWY_DYNAMIC_DISPATCH(meet_shaft)(group, shaft, near);
+unsigned meet_shaft(const TraceGroup& group, const Beginning& from, const Shaft& shaft,
+                    float* near) {
+  return HWY_DYNAMIC_DISPATCH(meet_shaft)(group, from, shaft, near);
 }
 
 }  // namespace ptc

@@ -31,24 +31,30 @@ struct RayHit {
 enum class RaysFor : bool { nearest, any };
 
 /// Decodes the children of a group.
-void decode_boxes(const GroupView& group, const RayStarts& starts, TraceGroup& into);
+void decode_boxes(const GroupView& group, const TraceRules& rules, TraceGroup& into);
 
-/// Appends surfels of a point page to a leaf, but for those that no ray can meet.
+/// Decodes points of a page into a leaf whose anchor is set.
 /// @param payload  of the page; up to 64 bytes past its end may be read
 /// @param count    number of points on the page
-/// @param first    index of the first surfel on the page
-/// @param number   how many surfels; with those of `from` at most kTraceDiscs
-/// @param from     number of the first surfel in its leaf
+/// @param first    index of the first point on the page
+/// @param number   how many points; with those of `from` at most kTraceDiscs
+/// @param from     number of the first point in its leaf
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const RayStarts& starts, TraceLeaf& into);
+                  unsigned number, unsigned from, const TraceRules& rules, TraceLeaf& into);
+
+/// Says whether rays from a place over the horizon of a normal can meet a disc of a leaf.
+/// @param from  where the rays begin, relative to the leaf
+/// @param axis  unit; the rays' directions d have d . axis >= 0
+[[nodiscard]] bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axis,
+                            const TraceRules& rules);
 
 /// Chooses from a list the boxes that rays of a few directions may meet, in the same order.
 void narrow_boxes(const BoxList& from, std::span<const glm::vec3> directions, BoxList& into);
 
-/// A ray from a surface towards a light, relative to the origin of a tree.
+/// A ray from a surface towards a light.
 struct ShadowRay {
-  glm::vec3 origin{0};                                    ///< edges of the frame
-  glm::vec3 direction{0};                                 ///< unit
+  glm::vec3 origin{0};     ///< relative to the place around which rays begin, edges of the frame
+  glm::vec3 direction{0};  ///< unit
   float length = std::numeric_limits<float>::infinity();  ///< up to the light, edges
 };
 
@@ -67,26 +73,31 @@ struct Shaft {
 };
 
 /// Tests the children of a group against a shaft.
+/// @param from  what the shaft is relative to, as the group sees it
 /// @param near  gets kTraceLanes depths, before which no ray enters the boxes
 /// @return      bit i: rays may meet something in child i
-[[nodiscard]] unsigned meet_shaft(const TraceGroup& group, const Shaft& shaft, float* near);
+[[nodiscard]] unsigned meet_shaft(const TraceGroup& group, const Beginning& from,
+                                  const Shaft& shaft, float* near);
 
 /// Finds out which rays something hides from their lights.
+/// @param place   around which the rays begin, and to which the list is relative, lattice units
 /// @param list    boxes that hold everything the rays can meet, and words as for trace_rays()
 /// @param chosen  indices of the rays
 /// @param hidden  by index of the ray; gets 1 or 0
 /// @throws as trace_rays()
-void trace_shadows(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                   std::span<const ShadowRay> rays, std::span<const std::uint32_t> chosen,
-                   std::span<std::uint8_t> hidden);
+void trace_shadows(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                   std::span<const std::uint64_t> words, std::span<const ShadowRay> rays,
+                   std::span<const std::uint32_t> chosen, std::span<std::uint8_t> hidden);
 
 /// Follows one ray after the other down the tree.
+/// @param place  where they begin, and to which the list is relative, lattice units
 /// @param list   boxes that hold everything the rays can meet, from narrow_boxes()
 /// @param words  what the list's numbers stand for: references; the lowest bit of a number says
 ///               whether its node is interior, the others are its index here
 /// @param hits   as many as directions; replaced where a disc is nearer
 /// @throws FormatError when a page is damaged, or the tree leads in circles
-void trace_rays(DecodedTree& tree, const BoxList& list, std::span<const std::uint64_t> words,
-                std::span<const glm::vec3> directions, RaysFor wanted, std::span<RayHit> hits);
+void trace_rays(DecodedTree& tree, const glm::dvec3& place, const BoxList& list,
+                std::span<const std::uint64_t> words, std::span<const glm::vec3> directions,
+                RaysFor wanted, std::span<RayHit> hits);
 
 }  // namespace ptc

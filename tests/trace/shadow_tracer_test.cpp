@@ -60,16 +60,14 @@ void check_rays(const Scene& scene, const std::vector<Segment>& rays, Sides side
   ShadowTracer tracer(view, cache, sides);
   glm::dvec3 middle(0);
   for (const Segment& ray : rays) middle += ray.origin / static_cast<double>(rays.size());
-  double reach = 0;
   std::vector<ShadowRay> shadows;
   for (const Segment& ray : rays) {
-    reach = std::max(reach, glm::length(ray.origin - middle));
     shadows.push_back({.origin = view.scale().way(middle, ray.origin),
                        .direction = glm::vec3(ray.direction),
                        .length = static_cast<float>(view.scale().length(ray.length))});
   }
   std::vector<std::uint8_t> hidden(rays.size());
-  tracer.begin(middle, static_cast<float>(view.scale().length(reach)));
+  tracer.begin(middle);
   tracer.test(shadows, hidden);
   std::size_t wrong = 0, known = 0, dark = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -172,7 +170,7 @@ TEST_CASE("shadows: an empty scene hides nothing", "[trace][shadows]") {
   const SceneView view(*scene.container);
   PageCache cache(*scene.container, {.memory_bytes = 64U << 20});
   ShadowTracer tracer(view, cache, Sides::both);
-  tracer.begin({0, 0, 0}, 1);
+  tracer.begin({0, 0, 0});
   const std::vector<ShadowRay> rays(20, {.direction = {0, 0, 1}});
   std::vector<std::uint8_t> hidden(rays.size(), 7);
   tracer.test(rays, hidden);

@@ -102,16 +102,10 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
                             std::span<glm::vec3> out) const {
   // Trace around the middle of the block
   Bounds bounds;
-  double highest = 0;
-  for (std::size_t i = 0; i < surfels.size(); ++i) {
-    bounds.add(surfels[i].position);
-    highest = std::max(highest, static_cast<double>(heights[i] + surfels[i].radius));
-  }
+  for (const Surfel& surfel : surfels) bounds.add(surfel.position);
   const glm::dvec3 middle = 0.5 * bounds.low + 0.5 * bounds.high;
   const SceneScale& scale = view_.scale();
-  const double reach = std::min(scale.length(0.5 * glm::length(bounds.high - bounds.low) + highest),
-                                SceneScale::kMaxDistance);
-  own.tracer.begin(middle, static_cast<float>(reach));
+  own.tracer.begin(middle);
   for (std::size_t from = 0; from < surfels.size(); from += kNeighbours) {
     // Draw the rays of some neighbours, and trace them
     const std::size_t to = std::min(from + kNeighbours, surfels.size());
