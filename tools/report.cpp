@@ -61,6 +61,7 @@ ordered_json facts_of(const TuningReport& tuning) {
           {"parallax", tuning.gather.parallax},
           {"resolution", tuning.gather.resolution},
           {"inflation", tuning.gather.inflation},
+          {"receiver_rays", tuning.receiver_rays},
           {"measured", facts_of(tuning.measured)},
           {"pilots", tuning.pilots},
           {"rays", tuning.rays},
@@ -74,6 +75,12 @@ std::string tuning_text(const TuningReport& tuning) {
   const std::string setting =
       fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
   const double measured = 100 * tuning.measured.relative();
+  if (tuning.receiver_rays > 0) {
+    return fmt::format(
+        "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers with {} rays each, which "
+        "cost less than the gather ({})\n",
+        100 * tuning.asked, measured, tuning.pilots, tuning.receiver_rays, setting);
+  }
   if (tuning.met) {
     return fmt::format(
         "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers with {} (setting {} of "

@@ -56,6 +56,11 @@ RayShader::Worker& RayShader::worker(unsigned thread) {
   return *workers_[thread];
 }
 
+CacheStatistics RayShader::cache_statistics() {
+  for (auto& own : workers_) own.reset();
+  return cache_->statistics();
+}
+
 void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
                       std::span<Shading> results, Progress& progress) {
   // Take receivers along the Z-curve, so that neighbours find each other's pages

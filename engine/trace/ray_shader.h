@@ -33,7 +33,8 @@ struct RayOptions {
 /// Returns the options of rays that find what a shader approximates, under the same cap.
 [[nodiscard]] RayOptions ray_options(const ShadeOptions& options);
 
-/// Shades receivers by rays through the octree: the reference for a gather's own error.
+/// Shades receivers by rays through the octree: far-apart ones cheaper than the gather, and others
+/// as the reference for its own error.
 ///
 /// Results depend on the receivers, the number of rays and the seed alone.
 /// Memory: RayOptions::memory_bytes, and 44 bytes for each ray of a receiver and thread.
@@ -51,6 +52,9 @@ class RayShader {
   /// @throws FormatError when a page is damaged; std::system_error
   void trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
              std::span<Shading> results, Progress& progress);
+
+  /// Frees what threads have decoded, and returns what the page cache counted.
+  [[nodiscard]] CacheStatistics cache_statistics();
 
  private:
   struct Worker;

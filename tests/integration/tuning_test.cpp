@@ -156,6 +156,7 @@ TEST_CASE("tuning: a requested error is met at receivers that did not choose the
       REQUIRE(report.tuning);
       CAPTURE(asked, report.tuning->setting, report.tuning->measured.relative());
       CHECK(report.tuning->met);
+      CHECK(report.tuning->receiver_rays == 0);  // neighbours share what the gather finds
       CHECK(report.check->discs.relative() <= asked);
       CHECK(report.tuning->setting >= setting);
       setting = report.tuning->setting;
@@ -188,6 +189,46 @@ TEST_CASE("tuning: neither threads nor the cap change the choice or any byte",
   const LightingReport other = shade_with(scene, 0.1, {}, "other.ptcx");
   CHECK(other.tuning->setting < one.tuning->setting);
   CHECK(bytes("other.ptcx") != bytes("one.ptcx"));
+}
+
+TEST_CASE("tuning: receivers far apart are shaded by rays where these cost less",
+          "[integration][error]") {
+  TemporaryDirectory dir;
+  Progress silent;
+  static_cast<void>(build_container({.city_points = 600'000}, dir.path() / "city.ptcx", silent));
+  const auto shade = [&](double error, const RunOptions& run, const char* name) {
+    ShadeRequest request{{.scene = dir.path() / "city.ptcx", .error = error, .run = run}};
+    request.count = 1500;
+    request.check = {.receivers = 400, .rays = 4096};
+    return shade_container(request, dir.path() / name, silent);
+  };
+  const LightingReport one =
+      shade(0.02, {.memory_bytes = std::uint64_t{1} << 30, .threads = 1}, "one.ply");
+  REQUIRE(one.tuning->receiver_rays > 0);
+  CHECK(one.tuning->met);
+  CHECK(one.receivers == 1500);
+  CHECK(one.gather.receivers == 0);
+  CHECK(one.cache.misses > 0);
+  CHECK(one.tuning->measured.relative() <= 0.02);
+  CHECK(one.check->discs.relative() <= 1.2 * 0.02);
+  CHECK(one.check->discs.relative() >= 0.3 * 0.02);  // not the rays that it is compared with
+  // A container of the receivers records it
+  ShadeRequest again{{.scene = dir.path() / "city.ptcx", .error = 0.02}};
+  again.receivers = dir.path() / "one.ply";
+  const unsigned rays =
+      shade_container(again, dir.path() / "again.ptcx", silent).tuning->receiver_rays;
+  CHECK(rays > 0);
+  CHECK(ContainerReader(dir.path() / "again.ptcx")
+            .meta()
+            .text.at("shading")
+            .starts_with("rays " + std::to_string(rays) + " sides both"));
+  // Neither threads nor the cap change a byte
+  const LightingReport two =
+      shade(0.02, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ply");
+  CHECK(two.tuning->receiver_rays == one.tuning->receiver_rays);
+  CHECK(bytes_of(dir.path() / "one.ply") == bytes_of(dir.path() / "two.ply"));
+  // A coarse gather costs less
+  CHECK(shade(0.2, {}, "coarse.ply").tuning->receiver_rays == 0);
 }
 
 TEST_CASE("tuning: runs with few receivers and scenes with few surfels have pilots, too",

@@ -2,9 +2,10 @@
 // because no two of them run at once:
 //
 //   prepare()   bounces before the last   a cache for each, one after another
-//   tune()      rays, then gathers        surfels under rays, then a cache; both are freed
+//   tune()      rays, gathers, rays       a cache for each, one after another
 //   shade()     Shader, Estimator         one cache for both
-//   check()     rays                      surfels under rays; finish() has freed the cache
+//               or rays                   a cache
+//   check()     rays                      a cache; finish() has freed that of shade()
 #include "engine/pipeline/light/lighting.h"
 
 #include <array>
@@ -148,9 +149,11 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
     // Choose the settings
     if (request_.error) {
       const Stage stage(report_.seconds, progress_, "tune", 0, "receivers");
-      report_.tuning = ptc::tune(lit(), options_, *request_.error, pilots, executor_, progress_,
-                                 compared, traced);
+      // Rays see the whole hemisphere, and estimates are fitted to gathers
       const Surroundings around = options_.gather.around;
+      const bool by_rays = around.is_plain() && !request_.estimate;
+      report_.tuning = ptc::tune(lit(), options_, *request_.error, by_rays, pilots, executor_,
+                                 progress_, compared, traced);
       options_.gather = report_.tuning->gather;
       options_.gather.around = around;
     }
@@ -167,15 +170,24 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
     }
   }
 
-  // Start the sample for check(), without the pilots, and the gather
+  // Start the sample for check(), without the pilots, and the gather or the rays
   sample_.emplace(request_.check, std::move(compared));
-  shader_ = std::make_unique<Shader>(lit(), options_, executor_);
+  if (receiver_rays() > 0) {
+    rays_ = std::make_unique<RayShader>(lit(), ray_options(options_), executor_);
+  } else {
+    shader_ = std::make_unique<Shader>(lit(), options_, executor_);
+  }
 }
 
 LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned variant) {
   results_.resize(receivers.size());
   const double before = cpu_seconds();
-  shader_->shade(receivers, results_, progress_, variant);
+  if (rays_) {
+    rays_->trace(receivers, receiver_rays(), kRunSeed + report_.receivers, results_, progress_);
+  } else {
+    shader_->shade(receivers, results_, progress_, variant);
+  }
+  report_.receivers += receivers.size();
   report_.shade_cpu_seconds += cpu_seconds() - before;
   LitReceivers lit{.shading = results_};
   if (estimator_) lit.estimates = estimator_->estimate(receivers, results_, variant);
@@ -184,9 +196,12 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned varia
 }
 
 void Lighting::finish() {
-  report_.gather = shader_->counts();
-  report_.receivers = report_.gather.receivers;
-  report_.cache = shader_->cache_statistics();
+  if (rays_) {
+    report_.cache = rays_->cache_statistics();
+  } else {
+    report_.gather = shader_->counts();
+    report_.cache = shader_->cache_statistics();
+  }
   if (estimator_) {
     report_.cache = estimator_->cache_statistics();
     report_.estimate = estimator_->report();
@@ -194,6 +209,7 @@ void Lighting::finish() {
   if (lost_) report_.damage = damage_report(scene_, *lost_, report_.gather.damage);
   estimator_.reset();
   shader_.reset();
+  rays_.reset();
 }
 
 void Lighting::check(const CheckScene& seen) {

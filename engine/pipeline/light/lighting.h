@@ -1,4 +1,5 @@
-// One run of the gather: what shading points and rendering a picture have in common.
+// One run of the gather, or of rays in its place: what shading points and rendering a picture have
+// in common.
 //
 //   Lighting()  ->  prepare()        ->  tune()       ->  shade() ...  ->  finish()  ->  check()
 //   open the        divide memory,       settings by      block by         complete      rays at
@@ -27,6 +28,7 @@
 #include "engine/shade/lost_pages.h"
 #include "engine/shade/shader.h"
 #include "engine/store/reader.h"
+#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 
@@ -84,10 +86,10 @@ struct DamageReport {
 struct LightingReport {
   std::uint64_t receivers = 0;             ///< number of receivers that were shaded
   unsigned bounces = 1;                    ///< as LightingRequest::bounces
-  double shade_cpu_seconds = 0;            ///< CPU time of the last bounce's gather, all threads
+  double shade_cpu_seconds = 0;            ///< CPU time of the last bounce, all threads
   double bounce_cpu_seconds = 0;           ///< CPU time of earlier bounces' gathers, all threads
-  GatherCounts gather;                     ///< work of the last bounce's gather
-  CacheStatistics cache;                   ///< page cache of the last bounce's gather
+  GatherCounts gather;                     ///< work of the last bounce's gather; none by rays
+  CacheStatistics cache;                   ///< page cache of the last bounce
   std::optional<TuningReport> tuning;      ///< present when an error was asked for
   std::optional<EstimateReport> estimate;  ///< present when estimates were asked for
   std::optional<CheckReport> check;        ///< present when a check was asked for
@@ -139,8 +141,12 @@ class Lighting {
   /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots);
 
-  /// The settings of the gather that shade() uses.
+  /// The settings of the gather that shade() uses, unless it traces rays.
   [[nodiscard]] const GatherOptions& gather() const noexcept { return options_.gather; }
+  /// The number of rays by which shade() shades a receiver; 0: by the gather.
+  [[nodiscard]] unsigned receiver_rays() const noexcept {
+    return report_.tuning ? report_.tuning->receiver_rays : 0;
+  }
 
   /// Shades a block of receivers. They should follow the Z-curve from call to call, because
   /// neighbours share pages.
@@ -169,7 +175,8 @@ class Lighting {
   std::unique_ptr<ContainerReader> bounced_;
   ShadeOptions options_;
   std::unique_ptr<Estimator> estimator_;
-  std::unique_ptr<Shader> shader_;
+  std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
+  std::unique_ptr<RayShader> rays_;  ///< null where the gather does
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
 

@@ -1,9 +1,12 @@
-// Finds the cheapest settings of the gather that meet an error (spec/shading.md#error).
+// Finds the cheapest way of shading that meets an error (spec/shading.md#error): the gather at one
+// of a ladder of settings, or rays.
 //
 //   ladder()   coarse, cheap  |--|--|--|--|--|--|--|--|--|--|--|--|--|--|  fine, slow
 //                                       ^        usual error of the rungs: where the search begins
 //              even pilots              |==>|    choose a rung by bisection
 //              odd pilots                   |>|  confirm it, or climb on
+//
+//   rays       as many as the noise at the pilots says, where that costs less
 #pragma once
 
 #include <cstdint>
@@ -39,32 +42,40 @@ struct Rung {
 
 /// The result of a search for settings that meet an error (spec/shading.md#error).
 struct TuningReport {
-  double asked = 0;       ///< error that was asked for, as CheckError::relative()
-  bool met = false;       ///< false: the finest setting was taken, and `measured` is its error
-  GatherOptions gather;   ///< setting that was chosen
+  double asked = 0;      ///< error that was asked for, as CheckError::relative()
+  bool met = false;      ///< false: the finest setting was taken, and `measured` is its error
+  GatherOptions gather;  ///< setting that was chosen
+  /// Rays of a receiver, where these cost less than the gather at that setting; 0: the gather
+  /// shades
+  unsigned receiver_rays = 0;
   unsigned setting = 0;   ///< index of that setting in ladder()
   unsigned settings = 0;  ///< size of ladder()
-  /// Error of the setting at the pilots that did not choose it; at all pilots when `met` is false
-  /// or there is only one pilot.
+  /// Error of the setting or of the rays at the pilots that did not choose; at all pilots when
+  /// `met` is false or there is only one pilot.
   CheckError measured;
-  std::size_t pilots = 0;        ///< number of receivers compared with rays
-  unsigned rays = 0;             ///< rays for each of these receivers
-  std::uint64_t shaded = 0;      ///< receivers that were shaded, over all settings that were tried
-  double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads
+  std::size_t pilots = 0;      ///< number of receivers compared with rays
+  unsigned rays = 0;           ///< rays for each of these receivers that results are compared with
+  std::uint64_t shaded = 0;    ///< receivers that were shaded, over all settings that were tried
+  double ray_cpu_seconds = 0;  ///< CPU time of the rays, all threads
   double shade_cpu_seconds = 0;  ///< CPU time of the gathers, all threads
 };
 
-/// Compares pilots with rays at the same surfels and finds the cheapest setting that meets `asked`.
-/// The result depends on neither threads nor memory cap.
+/// Seed of the rays of the first receiver of a run that is shaded by rays: far from those of rays
+/// that results are compared with.
+inline constexpr std::uint64_t kRunSeed = std::uint64_t{1} << 40;
+
+/// Compares pilots with rays at the same surfels and finds the cheapest way to meet `asked`.
+/// The result depends on neither threads nor memory cap: what costs less is told from counts.
 /// @param options   options of the run. Of its gather, only the sides and the light that it is
 ///                  about count. Its cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
+/// @param by_rays   whether rays may shade the receivers
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
 ///                  pilot
 /// @throws FormatError when a page is damaged; std::system_error
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
-                                double asked, std::span<const Pilot> pilots,
+                                double asked, bool by_rays, std::span<const Pilot> pilots,
                                 const Executor& executor, Progress& progress,
                                 ReceiverPlaces& compared, std::vector<Shading>& traced);
 

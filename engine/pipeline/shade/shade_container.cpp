@@ -130,11 +130,12 @@ class PointCursor {
 };
 
 /// Returns the text by which a shaded container records its settings.
-std::string settings_text(const ShadeRequest& request, const GatherOptions& g) {
-  std::string text =
-      fmt::format("solid_angle {} parallax {} inflation {} resolution {} sides {} lift {}",
-                  g.solid_angle, g.parallax, g.inflation, g.resolution,
-                  g.sides == Sides::both ? "both" : "front", request.lift);
+/// @param rays  of a receiver; 0: the gather shaded it
+std::string settings_text(const ShadeRequest& request, const GatherOptions& g, unsigned rays) {
+  std::string text = rays > 0 ? fmt::format("rays {}", rays)
+                              : fmt::format("solid_angle {} parallax {} inflation {} resolution {}",
+                                            g.solid_angle, g.parallax, g.inflation, g.resolution);
+  text += fmt::format(" sides {} lift {}", g.sides == Sides::both ? "both" : "front", request.lift);
   const Surroundings& around = g.around;
   if (around.sphere) text += " sphere";
   if (around.cone < Surroundings{}.cone) text += fmt::format(" cone {}", around.cone);
@@ -293,7 +294,7 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
     const auto one = [&](const ShadeRequest& group, const std::filesystem::path& path) {
       return shade_points(group, path, "", progress);
     };
-    return shade_groups(request, target, settings_text(request, request.gather) + " groups",
+    return shade_groups(request, target, settings_text(request, request.gather, 0) + " groups",
                         las_records, one, progress);
   }
   // Open the scene and the receivers
@@ -316,9 +317,10 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
-  PointWriteInfo info = shaded_points(receivers.container, receivers.points,
-                                      settings_text(request, lighting.gather()),
-                                      request.colour_from, output_format(target));
+  PointWriteInfo info =
+      shaded_points(receivers.container, receivers.points,
+                    settings_text(request, lighting.gather(), lighting.receiver_rays()),
+                    request.colour_from, output_format(target));
   const std::string& records = receivers.other ? receivers.las_records : las_records;
   if (!records.empty()) info.text[kLasRecordsKey] = records;
   note_changed_values(target, info, progress);

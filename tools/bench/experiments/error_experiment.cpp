@@ -16,7 +16,7 @@ constexpr char kReading[] =
     "mesh also contain the error of the surfels themselves. Pilots are receivers of the same run "
     "by which the setting was chosen; their share is of the CPU time of the whole run. Where the "
     "error asked was not met, the finest setting was taken. A setting is a solid angle in sr, a "
-    "parallax in rad and R direction pixels along a cube edge.";
+    "parallax in rad and R direction pixels along a cube edge, or a number of rays.";
 
 /// A setting as tables show it.
 std::string setting_text(float solid_angle, float parallax, unsigned resolution) {
@@ -46,11 +46,13 @@ const Columns<ErrorRow>& columns() {
        {"setting"},
        [](const R& r) {
          const GatherOptions& g = r.tuning.gather;
+         if (r.tuning.receiver_rays > 0) return fmt::format("{} rays", r.tuning.receiver_rays);
          return setting_text(g.solid_angle, g.parallax, g.resolution);
        }},
       {"solid_angle", {}, gather(&GatherOptions::solid_angle)},
       {"parallax", {}, gather(&GatherOptions::parallax)},
       {"resolution", {}, gather(&GatherOptions::resolution)},
+      {"receiver_rays", {}, tuning(&TuningReport::receiver_rays)},
       {"receivers", {"receivers shaded"}, &R::receivers},
       {"us_per_receiver", {"CPU us/receiver", "{:.1f}"}, &R::us_per_receiver},
       {"wall_us_per_receiver", {"wall us/receiver", "{:.1f}"}, &R::wall_us_per_receiver},
