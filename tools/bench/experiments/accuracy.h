@@ -19,10 +19,6 @@ namespace ptc::bench {
 /// The methods in the order of charts: the hierarchical gather, rays through the octree, the plain
 /// gather, Embree's rays at the same discs, Embree's rays at the mesh.
 inline constexpr std::array kMethods{"ptcx", "ptcx-rays", "plain", "embree-discs", "embree-mesh"};
-/// The sets of receivers: what the pixels of a picture see, points of the scene in blocks of
-/// neighbours, and points that lie far apart.
-inline constexpr std::array kSets{"camera", "points", "sparse"};
-
 /// What a method computes: occlusion alone, or occlusion and irradiance together.
 enum class Quantity { occlusion, bleeding };
 /// The word for a quantity in tables: "occlusion" or "bleeding".

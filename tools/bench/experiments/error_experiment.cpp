@@ -124,15 +124,15 @@ Chart chart_of(const std::vector<SceneErrors>& scenes) {
   chart.note = std::string(kReading) + "\n";
   for (const SceneErrors& scene : scenes) {
     // Show measured against asked, and once the line on which both are equal
-    for (const char* set : {"points", "camera"}) {
+    for (const char* set : kSets) {
       ChartSeries series{.name = scene.name + ", " + set};
       for (const ErrorRow& row : scene.rows) {
         if (row.set != set) continue;
         series.points.push_back({.x = 100 * row.asked, .y = 100 * row.measured()});
-        if (&scene == &scenes.front() && row.set == "points")
+        if (&scene == &scenes.front() && row.set == scene.rows.front().set)
           limit.points.push_back({.x = 100 * row.asked, .y = 100 * row.asked});
       }
-      asked.series.push_back(std::move(series));
+      if (!series.points.empty()) asked.series.push_back(std::move(series));
     }
     // Show error against time over the ladder
     ChartSeries rungs{.name = scene.name + ", points"};
@@ -183,22 +183,29 @@ Experiment make_error_experiment() {
     d.points(options->scene.points, "500k", 50'000);
     d.checked(options->checked, 400);
     d.integer("--check-rays", options->rays, 16, 1 << 20, "Rays for each checked receiver");
+    d.words("--set", options->sets,
+            "Shade only these receivers: pixels of a picture, or points of the scene, all of them "
+            "or some far apart; repeatable");
+    d.for_experts("--set");
     d.quick(options->scene.width, 320);
     d.quick(options->scene.height, 180);
+    d.quick(options->scene.sparse_points, 1'000);
   };
   const auto run = [=](const Bench& b) {
     return measure_scenes(*scenes, 1, b, [&](const SceneChoice& choice) {
       return measure_errors(choice, *options, b.work, b.run, b.progress);
     });
   };
-  return {.name = "error",
-          .purpose =
-              "Measured error against the error asked with --error, for points and for a picture; "
-              "error against time at all settings that --error chooses from",
-          .quick = "50k points, a picture of 320 x 180, 400 receivers checked of each run",
-          .declare = declare,
-          .run = run,
-          .check = [scenes] { scenes->check(); }};
+  return {
+      .name = "error",
+      .purpose =
+          "Measured error against the error asked with --error, for points, points far apart and "
+          "a picture; "
+          "error against time at all settings that --error chooses from",
+      .quick = "50k points, a picture of 320 x 180, 400 receivers checked of each run",
+      .declare = declare,
+      .run = run,
+      .check = [scenes] { scenes->check(); }};
 }
 
 }  // namespace ptc::bench

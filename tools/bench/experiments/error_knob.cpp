@@ -22,7 +22,7 @@ double shading_seconds(const LightingReport& report) {
   return sum;
 }
 
-ErrorRow row_of(const std::string& scene, const char* set, const LightingReport& report) {
+ErrorRow row_of(const std::string& scene, const std::string& set, const LightingReport& report) {
   const double pilots = report.tuning->ray_cpu_seconds + report.tuning->shade_cpu_seconds;
   const auto receivers = static_cast<double>(std::max<std::uint64_t>(1, report.receivers));
   return {.scene = scene,
@@ -84,14 +84,17 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   render.camera = lit.camera;
   render.samples = 1;
   const PictureTarget target{.path = picture.path()};
-  // Shade points and picture once for each error asked
+  // Shade each set once for each error asked
   SceneErrors errors{.name = choice.name};
   for (const double asked : options.asked) {
     shade.error = render.error = asked;
-    errors.rows.push_back(
-        row_of(choice.name, "points", shade_container(shade, points.path(), progress)));
-    errors.rows.push_back(
-        row_of(choice.name, "camera", render_picture(render, std::span(&target, 1), progress)));
+    for (const std::string& set : options.sets) {
+      shade.count = set == "sparse" ? options.scene.sparse_points : 0;
+      const LightingReport report = set == "camera"
+                                        ? render_picture(render, std::span(&target, 1), progress)
+                                        : shade_container(shade, points.path(), progress);
+      errors.rows.push_back(row_of(choice.name, set, report));
+    }
   }
   // Climb the ladder of all settings
   const ContainerReader container(scene.path());

@@ -21,11 +21,12 @@ struct ErrorOptions {
   unsigned checked = 1000;  ///< receivers of each run that are compared with rays
   unsigned rays = 8192;     ///< rays for each of those receivers
   unsigned climbed = 64;    ///< number of blocks of points that every setting shades
+  std::vector<std::string> sets{kSets.begin(), kSets.end()};  ///< of kSets, those that are shaded
 };
 
 /// One run of ptcshade or ptcrender with --error.
 struct ErrorRow {
-  std::string scene, set;  ///< set: "points" for ptcshade, "camera" for ptcrender
+  std::string scene, set;  ///< set: one of kSets; ptcrender shades "camera", ptcshade the others
   double asked = 0;        ///< value of --error, a share
   TuningReport tuning;
   CheckReport check;
@@ -50,7 +51,8 @@ struct SceneErrors {
   [[nodiscard]] double slope() const;
 };
 
-/// Builds the scene, and shades its points and its picture once for each error asked.
+/// Builds the scene, and shades its points, some of them far apart and its picture once for each
+/// error asked.
 /// @param work  a directory with room for the container and the outputs, which are gone at the end
 /// @throws DataError, RequestError, std::system_error as build_container()
 [[nodiscard]] SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& options,

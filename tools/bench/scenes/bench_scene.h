@@ -2,6 +2,7 @@
 // receivers that are shaded.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -42,10 +43,14 @@ struct Pixel {
   glm::vec3 direct{0};       ///< emission, and reflected light of suns and lamps
 };
 
+/// The sets of receivers: what the pixels of a picture see, points of the scene in blocks of
+/// neighbours, and points that lie far apart.
+inline constexpr std::array kSets{"camera", "points", "sparse"};
+
 /// The receivers of one kind: what the pixels of a picture see, or points of the scene itself, in
 /// blocks of neighbours or far apart.
 struct ReceiverSet {
-  std::string name;  ///< "camera", "points" or "sparse"
+  std::string name;  ///< one of kSets
   std::vector<Receiver> receivers;
   /// The Pixel::receiver of a pixel that sees nothing.
   static constexpr std::size_t kNone = ~std::size_t{0};
