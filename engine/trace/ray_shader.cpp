@@ -9,8 +9,6 @@
 namespace ptc {
 namespace {
 
-static_assert(DiscTracer::kTile == kDirectionTile);
-
 std::unique_ptr<PageCache> make_cache(const ContainerReader& scene, const RayOptions& options,
                                       unsigned threads) {
   const std::uint64_t least = PageCache::min_bytes(scene, threads, options.back_end),

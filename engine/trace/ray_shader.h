@@ -37,7 +37,7 @@ struct RayOptions {
 /// as the reference for its own error.
 ///
 /// Results depend on the receivers, the number of rays and the seed alone.
-/// Memory: RayOptions::memory_bytes, and 44 bytes for each ray of a receiver and thread.
+/// Memory: RayOptions::memory_bytes, and 52 bytes for each ray of a receiver and thread.
 class RayShader {
  public:
   /// @param scene, executor  must outlive this
@@ -46,7 +46,7 @@ class RayShader {
 
   /// Traces cosine-distributed rays from receivers, those of cosine_directions(). Receiver i takes
   /// `seed` + i.
-  /// @param rays      number of rays for each receiver, best a power of 4
+  /// @param rays      number of rays for each receiver
   /// @param results   as many as receivers, in their order
   /// @param progress  advances by one for each receiver
   /// @throws FormatError when a page is damaged; std::system_error

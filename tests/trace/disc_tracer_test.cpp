@@ -214,6 +214,22 @@ TEST_CASE("trace: what a ray meets does not depend on the rays beside it", "[tra
   CHECK(doubled > 100);
 }
 
+TEST_CASE("trace: directions that follow one another lie close together", "[trace]") {
+  // On the disc below the hemisphere, where each has the same share
+  std::vector<glm::vec3> directions;
+  for (const std::size_t count : {100U, 1024U, 1088U}) {
+    cosine_directions({0, 0, 1}, count, 5, directions);
+    REQUIRE(directions.size() == count);
+    double sum = 0;
+    for (std::size_t i = 1; i < count; ++i) {
+      const glm::vec3 way = directions[i] - directions[i - 1];
+      sum += std::hypot(static_cast<double>(way.x), static_cast<double>(way.y));
+    }
+    const double share = std::sqrt(3.14159265 / static_cast<double>(count));
+    CHECK(sum / static_cast<double>(count) < 1.6 * share);
+  }
+}
+
 TEST_CASE("trace: an empty scene covers nothing", "[trace]") {
   Scene scene({});
   scene.receivers = {{{0, 0, 0}, {0, 0, 1}}};

@@ -1,6 +1,7 @@
 #include "engine/shade/reference/cosine_rays.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -14,27 +15,60 @@
 namespace ptc {
 namespace {
 
-/// Tiles of the square, row after row. Rows go to and fro, so that tiles that follow one another
-/// touch. Each is twice as wide as it is high, in the square's units of one direction.
-class Tiles {
- public:
-  explicit Tiles(std::size_t count)
-      : columns_(whole(std::sqrt(static_cast<double>(count) / (2.0 * kDirectionTile)))),
-        rows_(whole(static_cast<double>(count) / kDirectionTile / columns_)) {}
+/// Cells of the square along a Hilbert curve, on which any points that follow one another lie close
+/// together.
+///
+///     .--.  .--.
+///     |  |  |  |       Each quarter holds the curve again, turned so that the ends meet:
+///     '  '--'  '       cell >> 2 is the cell of half the resolution.
+///     .--.  .--.
+///     '  |  |  '
+constexpr unsigned kCurveBits = 6;  ///< of each coordinate of the finest cells
+constexpr unsigned kCurveSide = 1U << kCurveBits;
 
-  [[nodiscard]] std::size_t count() const noexcept { return std::size_t{columns_} * rows_; }
+constexpr std::array<std::uint16_t, std::size_t{kCurveSide} * kCurveSide> curve_cells() {
+  std::array<std::uint16_t, std::size_t{kCurveSide} * kCurveSide> cells{};
+  for (unsigned row = 0; row < kCurveSide; ++row) {
+    for (unsigned column = 0; column < kCurveSide; ++column) {
+      unsigned x = column, y = row, cell = 0;
+      for (unsigned side = kCurveSide / 2; side > 0; side /= 2) {
+        const bool right = (x & side) != 0, upper = (y & side) != 0;
+        cell = cell * 4 + (right ? (upper ? 2 : 3) : (upper ? 1 : 0));
+        // Turn what is in the quarter back to how the whole curve runs
+        x &= side - 1;
+        y &= side - 1;
+        if (upper) continue;
+        if (right) {
+          x = side - 1 - x;
+          y = side - 1 - y;
+        }
+        const unsigned turned = x;
+        x = y;
+        y = turned;
+      }
+      cells[std::size_t{row} * kCurveSide + column] = static_cast<std::uint16_t>(cell);
+    }
+  }
+  return cells;
+}
+
+/// Cells of about one point each.
+class Curve {
+ public:
+  explicit Curve(std::size_t points) {
+    while (bits_ < 2 * kCurveBits && points >> (bits_ + 2) != 0) bits_ += 2;
+  }
+
+  [[nodiscard]] std::size_t count() const noexcept { return std::size_t{1} << bits_; }
   [[nodiscard]] std::size_t of(const glm::vec2& point) const noexcept {
-    const auto column = static_cast<unsigned>(point.x * static_cast<float>(columns_)),
-               row = static_cast<unsigned>(point.y * static_cast<float>(rows_));
-    return std::size_t{row} * columns_ + (row & 1 ? columns_ - 1 - column : column);
+    static constexpr auto kCells = curve_cells();
+    const auto column = static_cast<std::size_t>(point.x * kCurveSide),
+               row = static_cast<std::size_t>(point.y * kCurveSide);
+    return kCells[row * kCurveSide + column] >> (2 * kCurveBits - bits_);
   }
 
  private:
-  static unsigned whole(double number) {
-    return std::max(1U, static_cast<unsigned>(std::lround(number)));
-  }
-
-  unsigned columns_, rows_;
+  unsigned bits_ = 0;
 };
 
 /// Takes a point of the square to the unit disc. Squares about the middle become circles: the
@@ -53,16 +87,16 @@ glm::vec2 concentric(const glm::vec2& point) {
 
 void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,
                        std::vector<glm::vec3>& directions) {
-  // Count the points of each tile
+  // Count the points of each cell
   const SquarePoints points(seed);
-  const Tiles tiles(count);
+  const Curve curve(count);
   thread_local std::vector<glm::vec2> square;
   thread_local std::vector<std::uint32_t> begins;
   square.resize(count);
-  begins.assign(tiles.count() + 1, 0);
+  begins.assign(curve.count() + 1, 0);
   for (std::size_t i = 0; i < count; ++i) {
     square[i] = points.square(static_cast<std::uint32_t>(i));
-    ++begins[tiles.of(square[i]) + 1];
+    ++begins[curve.of(square[i]) + 1];
   }
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
   // Put their directions in order
@@ -72,7 +106,7 @@ void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t
   directions.resize(count);
   for (const glm::vec2& point : square) {
     const glm::vec2 disc = concentric(point);
-    directions[begins[tiles.of(point)]++] =
+    directions[begins[curve.of(point)]++] =
         tangent * disc.x + bitangent * disc.y +
         normal * std::sqrt(std::max(0.0F, 1 - glm::dot(disc, disc)));
   }

@@ -25,16 +25,13 @@ struct DiscHit {
 };
 
 /// Makes cosine-distributed directions above a normal: points of SquarePoints, taken to the disc by
-/// the concentric map of Shirley and Chiu 1997. They are in the order of tiles of the square, so
-/// that neighbours in the list have neighbouring directions; of a power of 4 from 64 on, each tile
-/// has kDirectionTile of them. The same seed gives the same directions.
+/// the concentric map of Shirley and Chiu 1997. They are in the order of a Hilbert curve of the
+/// square, so that neighbours in the list have neighbouring directions. The same seed gives the
+/// same directions.
 /// @param count       number of directions
 /// @param directions  receives them
 void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,
                        std::vector<glm::vec3>& directions);
-
-/// Directions that lie close together.
-inline constexpr std::size_t kDirectionTile = 32;
 
 /// Sums up what the rays of a receiver have met.
 /// @param directions  of cosine_directions()
