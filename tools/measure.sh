@@ -81,6 +81,8 @@ measure demo-city demo city --points 20M --receivers 100k --memory 256M --stage 
   city --points 5k --receivers 1k --stage build --stage verify --stage shade "${once[@]}"
 measure error error fractal window city "$mesh+backdrop" --points 200k --checked 300 --check-rays 4096 -- \
   "$mesh+backdrop" --points 2k --checked 20 --check-rays 256
+measure error-sparse error city --points 2M --set sparse --checked 500 --check-rays 4096 -- \
+  city --points 2k --set sparse --checked 20 --check-rays 256
 measure formats formats -- --points 20k "${once[@]}"
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
