@@ -302,7 +302,8 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
       "SHARE is a percentage or a number up to 1: 2% and 0.02 are the same. The error is that of "
       "occlusion and of light, each relative to its mean, against rays that are traced at the "
       "surfels. Settings are tried at pilot receivers. The cheapest ones that meet the error are "
-      "used; if none does, the finest are used, and the report says so. By default the expert "
+      "used, or rays where these are cheaper; if none does, the finest are used, and the report "
+      "says so. By default the expert "
       "settings hold.");
   option->type_name("SHARE")->group("Quality");
   for (const char* name : {"--solid-angle", "--parallax", "--inflation", "--resolution"}) {

@@ -77,9 +77,9 @@ std::string tuning_text(const TuningReport& tuning) {
   const double measured = 100 * tuning.measured.relative();
   if (tuning.receiver_rays > 0) {
     return fmt::format(
-        "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers with {} rays each, which "
-        "cost less than the gather ({})\n",
-        100 * tuning.asked, measured, tuning.pilots, tuning.receiver_rays, setting);
+        "  error: {:.4g} % asked, {:.2f} % measured at {} pilot receivers, shaded by {} rays "
+        "each, which take less time than the gather\n",
+        100 * tuning.asked, measured, tuning.pilots, tuning.receiver_rays);
   }
   if (tuning.met) {
     return fmt::format(

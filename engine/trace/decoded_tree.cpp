@@ -9,7 +9,8 @@
 namespace ptc {
 namespace {
 
-// Places of the tables, which a core's own cache holds. More of them, up to 64,000, do not pay
+// Places of the tables, which a core's own cache holds: more are hardly faster
+// (spec/notes/rays.md)
 constexpr std::size_t kGroupPlaces = 1024, kLeafPlaces = 1024;
 static_assert(kGroupPlaces * (sizeof(TraceGroup) + 8) + kLeafPlaces * (sizeof(TraceLeaf) + 8) <=
               DecodedTree::kBytes);

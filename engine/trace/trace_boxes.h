@@ -19,13 +19,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <new>
-#include <type_traits>
+#include <memory>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
-#include "engine/base/memory.h"
 #include "engine/shade/scene_scale.h"
 #include "engine/shade/shading.h"
 
@@ -174,9 +172,7 @@ class DecodedTable {
  public:
   /// @param places  a power of two
   explicit DecodedTable(std::size_t places)
-      : keys_(places, kNothing),
-        bytes_(places * sizeof(Value)),
-        values_(new (bytes_.data()) Value[places]) {}
+      : keys_(places, kNothing), values_(std::make_unique<Value[]>(places)) {}
 
   /// Returns what belongs to a key.
   /// @param decode  decode(value) fills the value when the table does not have it
@@ -194,12 +190,8 @@ class DecodedTable {
  private:
   static constexpr std::uint64_t kNothing = ~std::uint64_t{0};  ///< no reference, and no run
 
-  static_assert(std::is_trivially_default_constructible_v<Value> &&
-                std::is_trivially_destructible_v<Value>);
-
   std::vector<std::uint64_t> keys_;
-  Arena bytes_;  ///< in huge pages, because places that are near in time lie anywhere
-  Value* values_;
+  std::unique_ptr<Value[]> values_;
 };
 
 }  // namespace ptc

@@ -107,7 +107,7 @@ struct MetDiscs {
 };
 
 /// Tests a vector of discs of a leaf. Backs within two of their own radii of where the ray begins
-/// are clear, or all backs are.
+/// are clear; with Sides::front all backs are.
 /// @param at   number of the first disc
 /// @param far  depth beyond which discs do not count
 HWY_INLINE MetDiscs meet_discs(const TraceLeaf& leaf, unsigned at, const Beginning& from,
@@ -396,7 +396,9 @@ bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axi
     const Vec tilt{hn::NegMulAdd(cosine, up.x, normal.x), hn::NegMulAdd(cosine, up.y, normal.y),
                    hn::NegMulAdd(cosine, up.z, normal.z)};
     const auto rise = hn::Sqrt(hn::Mul(hn::Max(radius2, hn::Zero(f)), dot(tilt, tilt)));
-    const auto top = hn::Add(hn::Add(dot(to, up), rise), hn::Set(f, from.slack));
+    const auto size = hn::Add(rise, hn::Add(hn::Abs(to.x), hn::Add(hn::Abs(to.y), hn::Abs(to.z))));
+    const auto top = hn::MulAdd(hn::Set(f, kTraceRounding), size,
+                                hn::Add(hn::Add(dot(to, up), rise), hn::Set(f, from.slack)));
     const auto seen = hn::AndNot(clear, hn::Gt(top, hn::Zero(f)));
     if (!hn::AllFalse(
             f, hn::And(hn::And(seen, hn::Ge(radius2, hn::Zero(f))), hn::FirstN(f, leaf.size - at))))

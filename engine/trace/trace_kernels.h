@@ -42,7 +42,8 @@ void decode_boxes(const GroupView& group, const TraceRules& rules, TraceGroup& i
 void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
                   unsigned number, unsigned from, const TraceRules& rules, TraceLeaf& into);
 
-/// Says whether rays from a place over the horizon of a normal can meet a disc of a leaf.
+/// Says whether rays from a place over the horizon of a normal can meet a disc of a leaf without a
+/// rim.
 /// @param from  where the rays begin, relative to the leaf
 /// @param axis  unit; the rays' directions d have d . axis >= 0
 [[nodiscard]] bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axis,

@@ -74,7 +74,7 @@ class Bench(ProgramTest):
                                "--json")
         facts = json.loads((charts / "error.json").read_text())
         self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
-        self.assertEqual([r["asked"] for r in facts["rows"]], [a for a in (0.1, 0.05, 0.03, 0.02) for _ in range(2)])
+        self.assertEqual([r["asked"] for r in facts["rows"]], [a for a in (0.1, 0.05, 0.03, 0.02) for _ in range(3)])
         for row in facts["rows"]:
             self.assertGreater(row["measured"], 0)
             if row["met"]:

@@ -227,6 +227,13 @@ TEST_CASE("tuning: receivers far apart are shaded by rays where these cost less"
       shade(0.02, {.memory_bytes = std::uint64_t{81} << 20, .threads = 2}, "two.ply");
   CHECK(two.tuning->receiver_rays == one.tuning->receiver_rays);
   CHECK(bytes_of(dir.path() / "one.ply") == bytes_of(dir.path() / "two.ply"));
+  // Rays would find but a few pixels of a picture of the sky
+  ShadeRequest lit{{.scene = dir.path() / "city.ptcx", .error = 0.02}};
+  lit.count = 1500;
+  lit.sky = Sky{.radiance = glm::vec3(1),
+                .map = std::make_shared<const Image>(
+                    Image{.width = 2, .height = 1, .pixels = {glm::vec3(1), glm::vec3(2)}})};
+  CHECK(shade_container(lit, dir.path() / "lit.ply", silent).tuning->receiver_rays == 0);
   // A coarse gather costs less
   CHECK(shade(0.2, {}, "coarse.ply").tuning->receiver_rays == 0);
 }

@@ -131,6 +131,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
     around.distance = around.diagonals * static_cast<float>(diagonal_of(scene_));
     around.diagonals = 0;
   }
+  has_sky_map_ = sky.map != nullptr;
   // Without light on any surface there is none to gather
   const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
   options_.gather.bleeding = request_.bounces > 0 && is_lit;
@@ -149,9 +150,10 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
     // Choose the settings
     if (request_.error) {
       const Stage stage(report_.seconds, progress_, "tune", 0, "receivers");
-      // Rays see the whole hemisphere, and estimates are fitted to gathers
+      // Rays see the whole hemisphere, and of a picture of the sky a few pixels only; estimates are
+      // fitted to gathers
       const Surroundings around = options_.gather.around;
-      const bool by_rays = around.is_plain() && !request_.estimate;
+      const bool by_rays = around.is_plain() && !has_sky_map_ && !request_.estimate;
       report_.tuning = ptc::tune(lit(), options_, *request_.error, by_rays, pilots, executor_,
                                  progress_, compared, traced);
       options_.gather = report_.tuning->gather;

@@ -55,7 +55,7 @@ struct LightingRequest {
   /// Settings of the gather, between speed and error. With `error` only its sides count.
   GatherOptions gather;
   /// Error to meet, above 0 and at most 1, as CheckError::relative(); it chooses the settings of
-  /// `gather` (spec/shading.md#error). Empty: `gather` is used as it is.
+  /// `gather`, or rays in its place (spec/shading.md#error). Empty: `gather` is used as it is.
   std::optional<double> error;
   /// Estimates the error of every receiver, for about twice the time. Needs `error` or `check`.
   bool estimate = false;
@@ -174,6 +174,7 @@ class Lighting {
   /// The scene with the light of earlier bounces; null for fewer than two bounces.
   std::unique_ptr<ContainerReader> bounced_;
   ShadeOptions options_;
+  bool has_sky_map_ = false;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
   std::unique_ptr<RayShader> rays_;  ///< null where the gather does

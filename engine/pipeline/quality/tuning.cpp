@@ -6,8 +6,8 @@
 // count as error (error_sums.h), so the rays need only be as many as make it small.
 //
 // Rays have no error but their noise, which the pilots' two results tell. So they are as many as
-// bring that to what is asked, and the odd pilots confirm it at results of as many rays. What a
-// receiver costs either way is a sum over counts, so that the choice is the same each time.
+// bring that to what is asked, and both halves of the pilots confirm it at results of as many rays.
+// What a receiver costs either way is a sum over counts, so that the choice is the same each time.
 #include "engine/pipeline/quality/tuning.h"
 
 #include <algorithm>
@@ -58,9 +58,12 @@ constexpr double kNoiseFall = 0.6;
 constexpr unsigned kAttempts = 3;
 constexpr double kGrowth = 1.3;
 constexpr unsigned kRayStep = 32;
+// Most rays of a receiver: their memory fits what is charged for a thread that gathers
+constexpr unsigned kMostRays = 1U << 17;
 constexpr std::uint64_t kOwnSeed = std::uint64_t{1} << 32;
 
-/// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure().
+/// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure(), and
+/// at the end choose_rays().
 class Tuner {
  public:
   Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
@@ -97,7 +100,7 @@ class Tuner {
     discs.trace(twice, side * side, 0, traced_, progress);
   }
 
-  /// Frees the memory of the rays and gives it to a page cache. No rays can be traced afterwards.
+  /// Gives the memory of the rays, which are gone, to a page cache.
   void begin_shading() {
     return_freed_memory();
     cache_ = std::make_unique<PageCache>(scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
@@ -120,7 +123,8 @@ class Tuner {
     const double gather = gather_cost(rung);
     double rays = traced * std::pow(noise_of_half() / asked, 1 / kNoiseFall);
     for (unsigned attempt = 0; attempt < kAttempts; ++attempt, rays *= kGrowth) {
-      const auto steps = static_cast<unsigned>(std::ceil(std::min(rays, 1e6) / kRayStep));
+      const auto steps =
+          static_cast<unsigned>(std::ceil(std::min<double>(rays, kMostRays) / kRayStep));
       const unsigned count = kRayStep * std::max(1U, steps);
       if (kListCost + kRayCost * count >= gather) return 0;
       trace_own(count, progress);
