@@ -19,8 +19,7 @@ namespace ptc {
 /// distance is opened, and what lies below the horizon is left out. Tiles of neighbouring rays
 /// narrow the list to what they can meet, and a few of each tile do so again:
 ///
-///     tree  -- once a receiver -->  some 200 boxes  -- once a tile -->  some 80  -- 4 times -->
-///     rays
+///     tree  -- once a receiver -->  200 boxes  -- once a tile -->  80  -- for each 8 -->  rays
 ///
 /// What a ray meets depends on the ray alone: not on the cap, the threads, the order of pages or
 /// the other rays.

@@ -60,6 +60,7 @@ constexpr double kGrowth = 1.3;
 constexpr unsigned kRayStep = 32;
 // Most rays of a receiver: their memory fits what is charged for a thread that gathers
 constexpr unsigned kMostRays = 1U << 17;
+// Seed of results by rays, far from those that they are compared with
 constexpr std::uint64_t kOwnSeed = std::uint64_t{1} << 32;
 
 /// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure(), and
@@ -122,12 +123,16 @@ class Tuner {
   unsigned choose_rays(double asked, std::size_t rung, unsigned traced, Progress& progress) {
     const double gather = gather_cost(rung);
     double rays = traced * std::pow(noise_of_half() / asked, 1 / kNoiseFall);
+    cache_.reset();
+    return_freed_memory();
+    RayShader discs(scene_, ray_options(options_), executor_);
+    own_.resize(compared_.size());
     for (unsigned attempt = 0; attempt < kAttempts; ++attempt, rays *= kGrowth) {
       const auto steps =
           static_cast<unsigned>(std::ceil(std::min<double>(rays, kMostRays) / kRayStep));
       const unsigned count = kRayStep * std::max(1U, steps);
       if (kListCost + kRayCost * count >= gather) return 0;
-      trace_own(count, progress);
+      discs.trace(compared_, count, kOwnSeed, own_, progress);
       if (bound(own_errors(kChoosing)) <= asked && bound(own_errors(kConfirming)) <= asked)
         return count;
     }
@@ -213,12 +218,13 @@ class Tuner {
   /// Returns the errors of each pilot of a part at a rung, shaded at the first call.
   const std::vector<ErrorSums>& errors_of(std::size_t rung, std::size_t part) {
     std::vector<ErrorSums>& errors = errors_[rung][part];
-    if (errors.empty()) errors = shade(ladder()[rung].options(options_.gather), part, rung);
+    if (errors.empty()) errors = shade(rung, part);
     return errors;
   }
 
-  /// Shades the pilots of a part. @return the errors of each pilot
-  std::vector<ErrorSums> shade(const GatherOptions& gather, std::size_t part, std::size_t rung) {
+  /// Shades the pilots of a part at a rung. @return the errors of each pilot
+  std::vector<ErrorSums> shade(std::size_t rung, std::size_t part) {
+    const GatherOptions gather = ladder()[rung].options(options_.gather);
     const SceneView view(scene_);
     std::vector<std::unique_ptr<DirectionGrid>> grids;
     for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
@@ -252,16 +258,7 @@ class Tuner {
            kPixelsCost * side * side;
   }
 
-  /// Traces all compared receivers once more, as a run by rays does.
-  void trace_own(unsigned rays, Progress& progress) {
-    cache_.reset();
-    return_freed_memory();
-    RayShader discs(scene_, ray_options(options_), executor_);
-    own_.resize(compared_.size());
-    discs.trace(compared_, rays, kOwnSeed, own_, progress);
-  }
-
-  /// Returns the errors of each pilot of a part as trace_own() has shaded it.
+  /// Returns the errors of each pilot of a part at the results by rays.
   [[nodiscard]] std::vector<ErrorSums> own_errors(std::size_t part) const {
     std::vector<ErrorSums> errors;
     for (std::size_t i = part; i < pilots_.size(); i += 2) {

@@ -19,6 +19,7 @@ namespace ptc::bench {
 /// The methods in the order of charts: the hierarchical gather, rays through the octree, the plain
 /// gather, Embree's rays at the same discs, Embree's rays at the mesh.
 inline constexpr std::array kMethods{"ptcx", "ptcx-rays", "plain", "embree-discs", "embree-mesh"};
+
 /// What a method computes: occlusion alone, or occlusion and irradiance together.
 enum class Quantity { occlusion, bleeding };
 /// The word for a quantity in tables: "occlusion" or "bleeding".

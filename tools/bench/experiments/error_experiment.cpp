@@ -200,8 +200,7 @@ Experiment make_error_experiment() {
       .name = "error",
       .purpose =
           "Measured error against the error asked with --error, for points, points far apart and "
-          "a picture; "
-          "error against time at all settings that --error chooses from",
+          "a picture; error against time at all settings that --error chooses from",
       .quick = "50k points, a picture of 320 x 180, 400 receivers checked of each run",
       .declare = declare,
       .run = run,
