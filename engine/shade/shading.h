@@ -86,6 +86,9 @@ inline constexpr float kFlat = 0.9F;
 /// Length of the mean normal above which a cluster has a direction, so that it is drawn as an
 /// ellipsoid about its mean normal and not as a ball.
 inline constexpr float kDirected = 1e-3F;
+/// Thickness in radii of the bounding sphere below which a cluster with a direction is a sheet, all
+/// of whose surfels look along its mean normal or against it.
+inline constexpr float kSheet = 0.2F;
 /// Ratio of the ellipsoid's axes for a thickness of one radius of the bounding sphere.
 inline constexpr float kSlim = 0.5F;
 /// Maximum share of the ellipsoid's silhouette that a cluster covers.

@@ -301,9 +301,14 @@ TEST_CASE("sampler: a double-sided material gives two surfels back to back, each
   REQUIRE(surfels.size() == 4000);
   CHECK(covered_area(surfels) == Approx(2 * one_sided_area(mesh)).epsilon(1e-6));
   for (std::size_t i = 0; i < surfels.size(); i += 2) {
-    CHECK(surfels[i].position == surfels[i + 1].position);
+    // The front is nearer to who looks at it than the back's rim, also when positions are rounded
+    // to a thousandth of a radius, and the pair has a mean normal.
+    const glm::dvec3 apart = surfels[i].position - surfels[i + 1].position;
+    const float radius = surfels[i + 1].radius;
+    CHECK(glm::dot(apart, glm::dvec3(surfels[i].normal)) ==
+          Approx(0.04 * static_cast<double>(radius)).epsilon(0.03));
     CHECK(surfels[i].normal == -surfels[i + 1].normal);
-    CHECK(surfels[i].radius == surfels[i + 1].radius);
+    CHECK(surfels[i].radius / radius == Approx(1.0202F).epsilon(1e-4));
     CHECK(surfels[i].emission == glm::vec3(5));  // the front emits, and no light reaches it
     CHECK(surfels[i].radiance == glm::vec3(0));
     CHECK(surfels[i + 1].emission == glm::vec3(0));  // the back reflects
@@ -319,7 +324,9 @@ TEST_CASE("sampler: a mixture of one-sided and double-sided faces keeps number a
   for (std::size_t i = 0; i < 4; ++i) mesh.material_of[i] = 1;
   for (const std::uint64_t count : {5u, 300u, 5000u}) {
     const auto surfels = sample(mesh, count);
-    CHECK(covered_area(surfels) == Approx(8).epsilon(1e-6));
+    // Backs in the corners of the cube meet little but one-sided backs, and are buried.
+    CHECK(covered_area(surfels) <= 8.00001);
+    CHECK(covered_area(surfels) > 7.8);
     if (count > 5) {
       CHECK(static_cast<double>(surfels.size()) ==
             Approx(static_cast<double>(count)).epsilon(0.02));

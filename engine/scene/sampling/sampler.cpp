@@ -44,8 +44,12 @@ constexpr double kPatchSurfels = 8192;
 constexpr unsigned kPointsPerSurfel = 16;
 constexpr unsigned kRounds = 6;     // of Lloyd's method
 constexpr unsigned kLitPoints = 4;  // points of a surfel that light is traced from, evenly spread
-constexpr double kMinNormal = 0.1;  // least length of a mean normal that is used
-constexpr double kMaxAcross = 3e5;  // spacings along the side of a square as large as the mesh
+// Where both sides of a surface count, their surfels are kept apart: a back that lay at the place
+// of a front would hide it. Their radii differ, so that clusters of them have a mean normal.
+constexpr float kHalfGap = 0.02F;     // from the surface to each of them, radii
+constexpr float kDifference = 0.02F;  // of each one's area from their mean, over that
+constexpr double kMinNormal = 0.1;    // least length of a mean normal that is used
+constexpr double kMaxAcross = 3e5;    // spacings along the side of a square as large as the mesh
 
 // Returns the rays of one lit point, of those that a surfel has; rounded up.
 unsigned share(unsigned rays) {
@@ -275,16 +279,26 @@ std::vector<Surfel> MeshSource::make_patch(std::size_t index) const {
         sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
     if (!front && !back) continue;
     Surfel surfel = place(group, nearest, clusters[i]);
-    const glm::vec3 emission =
-        finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
-    surfel.emission = emission;
-    surfel.radiance = front.value_or(glm::vec3(0));
-    surfels.push_back(surfel);
-    if (sides == 1) continue;
-    surfel.normal = -surfel.normal;
-    surfel.emission = glm::vec3(0);
-    surfel.radiance = back.value_or(glm::vec3(0));
-    surfels.push_back(surfel);
+    const bool both = front && back;
+    const glm::dvec3 middle = surfel.position;
+    const glm::dvec3 apart(both ? kHalfGap * surfel.radius * surfel.normal : glm::vec3(0));
+    const float radius = surfel.radius, difference = both ? kDifference : 0;
+    if (front) {
+      surfel.radius = radius * std::sqrt(1 + difference);
+      surfel.position = middle + apart;
+      surfel.emission =
+          finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+      surfel.radiance = *front;
+      surfels.push_back(surfel);
+    }
+    if (back) {
+      surfel.radius = radius * std::sqrt(1 - difference);
+      surfel.position = middle - apart;
+      surfel.normal = -surfel.normal;
+      surfel.emission = glm::vec3(0);
+      surfel.radiance = *back;
+      surfels.push_back(surfel);
+    }
   }
   // Scale the radii so that the surfels have the area of the patch.
   const auto scale = static_cast<float>(std::sqrt(patch.area / covered));

@@ -12,8 +12,11 @@
 //            |        |           (A front when backs are clear)
 //            +---y----+
 //
-// A flat cluster, |S| > 0.9, is drawn as one surfel. Any other is an ellipsoid of revolution about
-// S, of the ratio s between its axes. Its silhouette is that of a disc:
+// A flat cluster, |S| > 0.9, is drawn as one surfel. A sheet, thinner than a fifth of r, is drawn
+// as the nearer of its two sides, for which S or -S takes the place of w above: a wall of surfels
+// back to back, lit on one side, has both bright and dark faces towards most w. Any other is an
+// ellipsoid of revolution about S, of the ratio s between its axes. Its silhouette is that of a
+// disc:
 //
 //                  S                  c = cosine between S and w
 //              ____|____     / w      q = sqrt(c^2 + s^2 (1 - c^2)), its foreshortening
@@ -221,43 +224,59 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   const auto known = hn::Lt(area, hn::Set(f, kMaxStoredArea));
   area = hn::Mul(hn::Mul(area, hn::Set(f, test.areas[0])), hn::Set(f, test.areas[1]));
   area = hn::IfThenElse(known, area, hn::Inf(f));
-  // Sum up the three faces that look at the receiver, and find the projected area. Fronts less
-  // backs are the mean normal's projection.
+  // Find the mean normal, and whether the cluster is a sheet, whose near side looks along it or
+  // against it.
+  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat)),
+             directed = hn::Gt(c.length, hn::Set(f, kDirected));
+  const auto sheet = hn::And(
+      directed, hn::AndNot(flat, hn::Lt(c.thickness, hn::Mul(hn::Set(f, kSheet), c.radius))));
+  const Vec normal{hn::IfThenElseZero(directed, c.normal.x),
+                   hn::IfThenElseZero(directed, c.normal.y),
+                   hn::IfThenElseZero(directed, c.normal.z)};
   const Vec toward = scaled(c.to, hn::Div(hn::Set(f, -1.0F), distance));
-  const VF along_axis[3] = {toward.x, toward.y, toward.z};
+  const auto cosine = dot(normal, toward);
+  const auto side = hn::CopySign(one, cosine);
+  const auto look = [&](VF along_normal, VF along) {
+    return hn::IfThenElse(sheet, hn::Mul(side, along_normal), along);
+  };
+  const VF along_axis[3] = {look(normal.x, toward.x), look(normal.y, toward.y),
+                            look(normal.z, toward.z)};
+  // Sum up the three faces that look there, and find the projected area. Fronts less backs are the
+  // mean normal's projection.
   VF weight[3], front = zero;
   for (int k = 0; k < 3; ++k) {
     weight[k] = hn::Mul(hn::Abs(along_axis[k]), cube.share(k, hn::Lt(along_axis[k], zero)));
     front = hn::Add(front, weight[k]);
   }
   const auto projected =
-      test.sides == Sides::both ? hn::Max(front, hn::Sub(front, dot(c.mean, toward))) : front;
+      test.sides == Sides::both
+          ? hn::Max(front,
+                    hn::Sub(front, dot(c.mean, {along_axis[0], along_axis[1], along_axis[2]})))
+          : front;
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
 
-  // Find the normal of the disc: the cluster's own where it is flat, else that of the disc with the
-  // ellipsoid's silhouette, turn * normal + rest * toward.
-  const auto flat = hn::Gt(c.length, hn::Set(f, kFlat)),
-             directed = hn::Gt(c.length, hn::Set(f, kDirected));
-  const Vec normal{hn::IfThenElseZero(directed, c.normal.x),
-                   hn::IfThenElseZero(directed, c.normal.y),
-                   hn::IfThenElseZero(directed, c.normal.z)};
-  const auto cosine = dot(normal, toward);
+  // Find the normal of the disc: the cluster's own where it is flat, that of its near side where it
+  // is a sheet, else that of the disc with the ellipsoid's silhouette, turn * normal + rest *
+  // toward.
   const auto ratio = hn::Mul(hn::Set(f, kSlim), hn::Div(c.thickness, c.radius));
   const auto slim = hn::IfThenElse(hn::And(directed, hn::Lt(ratio, one)), ratio, one);
   const auto lean2 = hn::NegMulAdd(slim, slim, one);
   const auto foreshortened =
       hn::Sqrt(hn::MulAdd(lean2, hn::Mul(cosine, cosine), hn::Mul(slim, slim)));
-  const auto turn = hn::IfThenElse(flat, one, hn::CopySign(hn::Sqrt(lean2), cosine));
-  const auto rest = hn::IfThenElse(flat, zero, hn::NegMulAdd(turn, cosine, foreshortened));
+  const auto plane = hn::Or(flat, sheet);
+  const auto turn =
+      hn::IfThenElse(plane, hn::IfThenElse(flat, one, side), hn::CopySign(hn::Sqrt(lean2), cosine));
+  const auto rest = hn::IfThenElse(plane, zero, hn::NegMulAdd(turn, cosine, foreshortened));
   const Vec disc_normal{hn::MulAdd(turn, normal.x, hn::Mul(rest, toward.x)),
                         hn::MulAdd(turn, normal.y, hn::Mul(rest, toward.y)),
                         hn::MulAdd(turn, normal.z, hn::Mul(rest, toward.z))};
-  // Find its radius: from half the area where it is flat, else from the projected area.
+  // Find its radius: from half the area where it is flat or a sheet, else from the projected area.
   const auto seen =
       hn::Mul(hn::Set(f, test.inflation / kPi), hn::Div(hn::Mul(area, projected), foreshortened));
-  const auto wanted = hn::IfThenElse(flat, hn::Mul(area, hn::Set(f, 0.5F)), seen);
+  const auto half = hn::Mul(hn::Mul(area, hn::Set(f, 0.5F)), hn::IfThenElse(flat, one, projected));
+  const auto wanted = hn::IfThenElse(plane, half, seen);
   const auto most =
-      hn::Mul(hn::IfThenElse(flat, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
+      hn::Mul(hn::IfThenElse(plane, one, hn::Set(f, kSolid)), hn::Mul(c.radius, c.radius));
   const auto radius2 = hn::IfThenElse(hn::Lt(wanted, most), wanted, most);
 
   const VU colour =

@@ -34,16 +34,24 @@ std::uint32_t pack(const glm::vec3& colour) {
   return encode_rgbe({colour.r, colour.g, colour.b});
 }
 
+/// Tells whether all surfels of a cluster lie about in one plane and look along its mean normal or
+/// against it.
+bool is_sheet(const ClusterShape& shape) {
+  const float length = glm::length(shape.mean);
+  return length > kDirected && length <= kFlat && shape.thickness < kSheet * shape.radius;
+}
+
 /// Appends the disc of a cluster to the queue.
 void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherOptions& options,
                   DiscQueue& queue) {
   const glm::vec3 toward = -glm::normalize(c.to);
-  const Front front = front_of(group, i, c, toward);
-  const float back = front.area - glm::dot(c.mean, toward);
+  const ClusterShape shape{c.mean, c.area, c.radius, c.thickness};
+  const glm::vec3 from = seen_from(shape, toward);
+  const Front front = front_of(group, i, c, from);
+  const float back = front.area - glm::dot(c.mean, from);
   const float projected = options.sides == Sides::both ? std::max(front.area, back) : front.area;
   if (!(c.area * projected > 0)) return;
-  const Splat splat = make_splat({c.mean, c.area, c.radius, c.thickness}, toward,
-                                 c.area * projected, options.inflation);
+  const Splat splat = make_splat(shape, toward, c.area * projected, options.inflation);
   const float over = lit_area(splat, front.area, projected);
   const glm::vec3 colour = over > 0 ? front.radiance / over : glm::vec3(0);
   queue.push(c.to, splat.normal, splat.radius, pack(colour));
@@ -51,11 +59,18 @@ void draw_cluster(const GroupView& group, int i, const Cluster& c, const GatherO
 
 }  // namespace
 
+glm::vec3 seen_from(const ClusterShape& shape, const glm::vec3& toward) {
+  if (!is_sheet(shape)) return toward;
+  return std::copysign(1 / glm::length(shape.mean), glm::dot(shape.mean, toward)) * shape.mean;
+}
+
 Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected,
                  float inflation) {
   const float length = glm::length(shape.mean);
   if (length > kFlat)
     return {shape.mean / length, std::min(shape.radius, std::sqrt(shape.area / 2)), true};
+  if (is_sheet(shape))
+    return {seen_from(shape, toward), std::min(shape.radius, std::sqrt(projected / 2)), false};
   // Take the disc that has the silhouette of an ellipsoid about the mean normal, or of a ball where
   // there is no direction.
   Splat splat{.normal = toward};

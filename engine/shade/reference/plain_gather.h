@@ -38,10 +38,16 @@ struct Splat {
   bool one_surfel = false;
 };
 
+/// Returns the unit direction from which a cluster shows the area and the light that it is drawn
+/// with: along the mean normal of a sheet or against it, on the side of the receiver, and towards
+/// the receiver for any other cluster.
+/// @param toward  unit, from the cluster to the receiver
+[[nodiscard]] glm::vec3 seen_from(const ClusterShape& shape, const glm::vec3& toward);
+
 /// Returns the disc that a cluster is drawn as (spec/shading.md#splats).
 /// @param toward     unit, from the cluster to the receiver
-/// @param projected  area of its fronts or of its backs as the receiver sees them, whichever is
-///                   greater; above 0
+/// @param projected  area of its fronts or of its backs from seen_from(), whichever is greater;
+///                   above 0
 /// @param inflation  GatherOptions::inflation
 [[nodiscard]] Splat make_splat(const ClusterShape& shape, const glm::vec3& toward, float projected,
                                float inflation);

@@ -246,11 +246,11 @@ class Study {
       const Node& node = tree_->nodes()[at];
       const glm::vec3 to(node.mean - receivers_[i].position);
       const glm::vec3 toward = -glm::normalize(to);
-      const Seen seen = see(at, toward);
-      const float projected = std::max(seen.front, seen.back);
-      if (!(projected > 0)) continue;
       const ClusterShape shape{node.normal, static_cast<float>(node.summary.area), node.radius,
                                node.thickness};
+      const Seen seen = see(at, seen_from(shape, toward));
+      const float projected = std::max(seen.front, seen.back);
+      if (!(projected > 0)) continue;
       const Splat splat = make_splat(shape, toward, projected, GatherOptions{}.inflation);
       const float lit = lit_area(splat, seen.front, projected);
       const float dim = lit > 0 ? seen.front / lit : 0;
