@@ -39,7 +39,7 @@ struct SurfaceHit {
 class RayScene {
  public:
   /// Builds Embree's tree over the mesh.
-  /// @param mesh  must outlive this and not change
+  /// @param mesh  must outlive this; only its materials may change
   /// @throws RequestError when check_mesh() does; std::bad_alloc; std::runtime_error when Embree
   ///         reports another error
   explicit RayScene(const Mesh& mesh);

@@ -23,6 +23,7 @@
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
+#include "engine/scene/sampling/solids.h"
 #include "engine/sort/external_sort.h"
 
 namespace ptc {
@@ -92,9 +93,18 @@ struct Clouds {
 /// The joined meshes of a request, ready for rays and light. It is destroyed before the sort needs
 /// its memory.
 struct LitMesh {
-  LitMesh(Mesh m, const LightRig& lights) : mesh(std::move(m)), rays(mesh), light(rays, lights) {}
+  /// @param later  whether the lights shine on the surfels only after they are in the container
+  LitMesh(Mesh m, const LightRig& lights, bool later)
+      : mesh(std::move(m)),
+        solids(find_solids(mesh)),
+        rays(mesh),
+        light(rays, later ? LightRig{} : lights) {
+    close_solids(mesh, solids, rays, lights);
+    solids = {};
+  }
 
   Mesh mesh;
+  Solids solids;  ///< of the mesh, until their materials are one-sided
   RayScene rays;
   DirectLight light;
 };
