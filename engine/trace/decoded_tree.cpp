@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "engine/trace/trace_kernels.h"
+#include "engine/trace/decode_kernels.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
 

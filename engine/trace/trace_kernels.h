@@ -12,7 +12,6 @@
 #include "engine/shade/shading.h"
 #include "engine/trace/decoded_tree.h"
 #include "engine/trace/trace_boxes.h"
-#include "format/node_page.h"
 
 namespace ptc {
 
@@ -29,18 +28,6 @@ struct RayHit {
 
 /// Whether rays look for the nearest disc, or for any disc that covers their direction.
 enum class RaysFor : bool { nearest, any };
-
-/// Decodes the children of a group.
-void decode_boxes(const GroupView& group, const TraceRules& rules, TraceGroup& into);
-
-/// Decodes points of a page into a leaf whose anchor is set.
-/// @param payload  of the page; up to 64 bytes past its end may be read
-/// @param count    number of points on the page
-/// @param first    index of the first point on the page
-/// @param number   how many points; with those of `from` at most kTraceDiscs
-/// @param from     number of the first point in its leaf
-void decode_discs(const std::byte* payload, std::uint32_t count, std::uint32_t first,
-                  unsigned number, unsigned from, const TraceRules& rules, TraceLeaf& into);
 
 /// Says whether rays from a place over the horizon of a normal can meet a disc of a leaf without a
 /// rim.
