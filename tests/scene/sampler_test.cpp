@@ -334,6 +334,16 @@ TEST_CASE("sampler: a mixture of one-sided and double-sided faces keeps number a
   }
 }
 
+TEST_CASE("sampler: where neither side is buried, double-sided faces have twice their area",
+          "[scene][sampler]") {
+  Mesh mesh = ground(1);
+  mesh.materials.emplace_back();
+  mesh.materials[1].double_sided = true;
+  add_quad(mesh, {5, 0, 0}, {0, 1, 0}, {0, 0, 2}, 1);
+  for (const std::uint64_t count : {5u, 300u, 5000u})
+    CHECK(covered_area(sample(mesh, count)) == Approx(8).epsilon(1e-6));
+}
+
 TEST_CASE("sampler: the surfels are the same for any number of threads and any block",
           "[scene][sampler]") {
   Mesh mesh = sphere(1, 40);

@@ -303,7 +303,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
-  inputs.lit = std::make_unique<LitMesh>(std::move(mesh), inputs.lights, inputs.relight);
+  const Solids solids = find_solids(mesh);  // before the ray scene, so that their peaks do not add
+  inputs.lit = std::make_unique<LitMesh>(std::move(mesh), solids, inputs.lights, inputs.relight);
   return_freed_memory();  // that reading the files and building the ray scene took
   return inputs;
 }

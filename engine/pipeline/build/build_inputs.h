@@ -93,18 +93,14 @@ struct Clouds {
 /// The joined meshes of a request, ready for rays and light. It is destroyed before the sort needs
 /// its memory.
 struct LitMesh {
-  /// @param later  whether the lights shine on the surfels only after they are in the container
-  LitMesh(Mesh m, const LightRig& lights, bool later)
-      : mesh(std::move(m)),
-        solids(find_solids(mesh)),
-        rays(mesh),
-        light(rays, later ? LightRig{} : lights) {
+  /// @param solids  of the mesh, which become one-sided
+  /// @param later   whether the lights shine on the surfels only after they are in the container
+  LitMesh(Mesh m, const Solids& solids, const LightRig& lights, bool later)
+      : mesh(std::move(m)), rays(mesh), light(rays, later ? LightRig{} : lights) {
     close_solids(mesh, solids, rays, lights);
-    solids = {};
   }
 
   Mesh mesh;
-  Solids solids;  ///< of the mesh, until their materials are one-sided
   RayScene rays;
   DirectLight light;
 };

@@ -34,6 +34,7 @@
 #include "engine/scene/sampling/clusters.h"
 #include "engine/scene/sampling/directions.h"
 #include "engine/scene/sampling/spacing_field.h"
+#include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/sampling/surface_patches.h"
 #include "engine/scene/sampling/surroundings.h"
 
@@ -330,11 +331,7 @@ double spacing_for(const Mesh& mesh, std::uint64_t count) {
   require_request(count > 0, "sampling.count", "`sampling.count` is 0");
   double area = 0;
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const auto& c = mesh.triangles[i];
-    const glm::dvec3 a(mesh.positions[c[0]]);
-    const double twice = glm::length(
-        glm::cross(glm::dvec3(mesh.positions[c[1]]) - a, glm::dvec3(mesh.positions[c[2]]) - a));
-    area += 0.5 * sides_of(mesh, i) * twice;
+    area += sides_of(mesh, i) * whole_triangle(mesh, i).area();
   }
   return std::sqrt(area / static_cast<double>(count));
 }

@@ -17,6 +17,7 @@
 
 #include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/step_off.h"
 
 namespace ptc {
@@ -149,11 +150,8 @@ bool holds_something(const RayScene& scene, std::uint64_t seed,
                      std::span<const std::uint32_t> triangles) {
   std::vector<double> reached;  // sums of the area up to and with each triangle
   for (const std::uint32_t i : triangles) {
-    const auto& c = scene.mesh().triangles[i];
-    const glm::dvec3 corner(scene.mesh().positions[c[0]]);
-    const glm::dvec3 across = glm::cross(glm::dvec3(scene.mesh().positions[c[1]]) - corner,
-                                         glm::dvec3(scene.mesh().positions[c[2]]) - corner);
-    reached.push_back((reached.empty() ? 0 : reached.back()) + glm::length(across));
+    const double area = whole_triangle(scene.mesh(), i).area();
+    reached.push_back(reached.empty() ? area : reached.back() + area);
   }
   const SquarePoints points(seed), places(~seed);
   std::uint32_t others = 0;
@@ -193,21 +191,20 @@ Solids find_solids(const Mesh& mesh) {
   mark_open(mesh, first, parents, open);
   std::vector<std::uint32_t> number(first.size(), Solids::kNone);
   std::vector<double> volume, area;
-  for (const auto& c : mesh.triangles) {
-    const std::uint32_t at = root(parents, first[c[0]]);
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const std::uint32_t at = root(parents, first[mesh.triangles[i][0]]);
     if (open[at]) continue;
     if (number[at] == Solids::kNone) {
       number[at] = solids.count++;
       volume.push_back(0);
       area.push_back(0);
     }
-    // A tetrahedron from a vertex of the surface keeps the digits of small things far from 0
-    const glm::dvec3 apex(mesh.positions[at]);
-    const glm::dvec3 p = glm::dvec3(mesh.positions[c[0]]) - apex;
-    const glm::dvec3 q = glm::dvec3(mesh.positions[c[1]]) - apex;
-    const glm::dvec3 r = glm::dvec3(mesh.positions[c[2]]) - apex;
-    volume[number[at]] += glm::dot(p, glm::cross(q, r)) / 6;
-    area[number[at]] += glm::length(glm::cross(q - p, r - p)) / 2;
+    // Add a tetrahedron from a vertex of the surface, which keeps the digits of small things far
+    // from 0
+    const SubTriangle triangle = whole_triangle(mesh, i);
+    const glm::dvec3 from_apex = triangle.corner[0] - glm::dvec3(mesh.positions[at]);
+    volume[number[at]] += glm::dot(from_apex, triangle.normal()) / 6;
+    area[number[at]] += triangle.area();
   }
   if (solids.count == 0) return solids;
   solids.of_vertex.resize(first.size());

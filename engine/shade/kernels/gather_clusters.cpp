@@ -239,8 +239,8 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
   const auto look = [&](VF along_normal, VF along) {
     return hn::IfThenElse(sheet, hn::Mul(side, along_normal), along);
   };
-  const VF along_axis[3] = {look(normal.x, toward.x), look(normal.y, toward.y),
-                            look(normal.z, toward.z)};
+  const Vec from{look(normal.x, toward.x), look(normal.y, toward.y), look(normal.z, toward.z)};
+  const VF along_axis[3] = {from.x, from.y, from.z};
   // Sum up the three faces that look there, and find the projected area. Fronts less backs are the
   // mean normal's projection.
   VF weight[3], front = zero;
@@ -249,10 +249,7 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
     front = hn::Add(front, weight[k]);
   }
   const auto projected =
-      test.sides == Sides::both
-          ? hn::Max(front,
-                    hn::Sub(front, dot(c.mean, {along_axis[0], along_axis[1], along_axis[2]})))
-          : front;
+      test.sides == Sides::both ? hn::Max(front, hn::Sub(front, dot(c.mean, from))) : front;
   mask = hn::And(mask, hn::Gt(hn::Mul(area, projected), zero));
 
   // Find the normal of the disc: the cluster's own where it is flat, that of its near side where it
@@ -265,7 +262,7 @@ HWY_INLINE void draw_clusters(const CellTest& test, MF mask, const Clusters& c, 
       hn::Sqrt(hn::MulAdd(lean2, hn::Mul(cosine, cosine), hn::Mul(slim, slim)));
   const auto plane = hn::Or(flat, sheet);
   const auto turn =
-      hn::IfThenElse(plane, hn::IfThenElse(flat, one, side), hn::CopySign(hn::Sqrt(lean2), cosine));
+      hn::IfThenElse(flat, one, hn::Mul(side, hn::IfThenElse(sheet, one, hn::Sqrt(lean2))));
   const auto rest = hn::IfThenElse(plane, zero, hn::NegMulAdd(turn, cosine, foreshortened));
   const Vec disc_normal{hn::MulAdd(turn, normal.x, hn::Mul(rest, toward.x)),
                         hn::MulAdd(turn, normal.y, hn::Mul(rest, toward.y)),
