@@ -122,6 +122,25 @@ TEST_CASE("pipeline: a mesh in memory gives the same container as its file",
   CHECK_FALSE(std::filesystem::exists(dir / "broken.ptcx"));
 }
 
+TEST_CASE("pipeline: a double-sided solid gives the container of a one-sided one",
+          "[integration][build]") {
+  const TemporaryDirectory dir;
+  write_cube(dir / "cube.obj");
+  Progress silent;
+  BuildRequest one = cube_request(dir / "cube.obj");
+  one.backdrop = false;  // the ground would be a front that the cube touches
+  Mesh cube = read_mesh(dir / "cube.obj").mesh;
+  for (Material& material : cube.materials) material.double_sided = true;
+  BuildRequest both = one;
+  both.inputs.clear();
+  both.mesh = std::make_shared<const Mesh>(cube);
+  const bool room = GENERATE(false, true);  // a lamp in it makes it one, of two sides
+  if (room) one.lights->points = both.lights->points = {{.position = {0.5, 0.5, 0.4}}};
+  build_container(one, dir / "one.ptcx", silent);
+  build_container(both, dir / "both.ptcx", silent);
+  CHECK((pages_of(dir / "both.ptcx") == pages_of(dir / "one.ptcx")) == !room);
+}
+
 TEST_CASE("pipeline: an output that does not fit on its disk is refused before work begins",
           "[integration][build]") {
   const TemporaryDirectory dir;
