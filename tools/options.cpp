@@ -250,6 +250,27 @@ void add_surroundings(CLI::App& app, Surroundings& around) {
       ->group(kGroup);
 }
 
+void add_glossy(CLI::App& app, GlossyRequest& glossy, const std::string& where) {
+  constexpr char kGroup[] = "Reflections";
+  app.add_option_function<float>(
+         "--glossy", [&glossy](const float& roughness) { glossy.roughness = roughness; },
+         "Also write what surfaces would reflect as rough mirrors\n"
+         "ROUGHNESS is that of glTF and of most renderers: 0 is a polished mirror, 1 is dull. "
+         "The " +
+             where +
+             "s are reflection, the radiance of a mirror that absorbs nothing, and "
+             "reflection_occlusion, the share of what it shows that surfaces cover. Emitters and "
+             "the sky are reflected; suns, point and spot lights are not.")
+      ->type_name("ROUGHNESS")
+      ->check(in_range(0, 1))
+      ->group(kGroup);
+  add_integer(app, "--glossy-rays", glossy.rays, 1, 1 << 18,
+              "Rays of each receiver of --glossy [default: 64, or what --error takes]")
+      ->default_str("")
+      ->needs("--glossy")
+      ->group(kGroup);
+}
+
 void add_preset(CLI::App& app, Preset& preset) {
   add_choice<Preset>(
       app, "--preset", preset,

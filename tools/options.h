@@ -61,6 +61,10 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
 /// Declares --sphere, --cone, --distance and --falloff.
 void add_surroundings(CLI::App& app, Surroundings& around);
 
+/// Declares --glossy ROUGHNESS and --glossy-rays N.
+/// @param where  what receives the reflection: a channel or a layer
+void add_glossy(CLI::App& app, GlossyRequest& glossy, const std::string& where);
+
 /// A name for settings that suit a kind of scene.
 enum class Preset { none, scan, interior, film };
 /// Declares --preset scan|interior|film.

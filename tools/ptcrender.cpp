@@ -24,8 +24,8 @@ constexpr char kPurpose[] =
     "\n"
     "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
     "occlusion, bent_normal, albedo and alpha. With --estimate it also holds occlusion_error and "
-    "irradiance_error. A .png holds the picture or one of the layers direct, indirect, occlusion "
-    "and albedo, for display.";
+    "irradiance_error, with --glossy reflection and reflection_occlusion. A .png holds the picture "
+    "or one of the layers direct, indirect, occlusion, albedo and reflection, for display.";
 constexpr char kExamples[] =
     "  # Render a mesh with the light of its container\n"
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
@@ -36,6 +36,8 @@ constexpr char kExamples[] =
     "  ptcrender room.ptcx --camera 0,1.6,4,0,1.2,0 --fov 50 --size 1920x1080 -o room.exr\n"
     "  # Write the picture, and its occlusion as a picture of its own\n"
     "  ptcrender room.ptcx -o room.png --layer occlusion=occlusion.png\n"
+    "  # Render what the surfaces would reflect if they were rough mirrors, too\n"
+    "  ptcrender room.ptcx --glossy 0.3 -o room.exr --layer reflection=reflection.png\n"
     "  # Meet an error of 3 %, and measure the error at 1000 receivers\n"
     "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n";
 
@@ -56,10 +58,10 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
     const std::size_t equals = text.find('=');
     const bool known = std::ranges::find(layers, text.substr(0, equals)) != layers.end() &&
                        ptc::has_ending(text, ".png");
-    return known && equals != std::string::npos
-               ? std::string()
-               : "expects direct=, indirect=, occlusion= or albedo= and the name of a .png, not '" +
-                     text + "'";
+    return known && equals != std::string::npos ? std::string()
+                                                : "expects direct=, indirect=, occlusion=, albedo= "
+                                                  "or reflection= and the name of a .png, not '" +
+                                                      text + "'";
   };
   const auto set = [&](const std::vector<std::string>& values) {
     for (const std::string& text : values) {
@@ -68,8 +70,9 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
     }
   };
   CLI::Option* layers = command.app().add_option_function<std::vector<std::string>>(
-      "--layer", set, "Also write direct, indirect, occlusion or albedo as PNG; repeatable");
-  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo=", ".png"})
+      "--layer", set,
+      "Also write direct, indirect, occlusion, albedo or reflection as PNG; repeatable");
+  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo=", "reflection=", ".png"})
       ->type_name("LAYER=FILE")
       ->group(ptc::kFilesGroup)
       ->allow_extra_args(false)
@@ -170,6 +173,7 @@ int main(int argc, char** argv) {
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(command.app(), preset);
   ptc::add_surroundings(command.app(), arguments.request.gather.around);
+  ptc::add_glossy(command.app(), arguments.request.glossy, "layer");
   ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
   ptc::add_error_option(command.app(), arguments.request.error);
   ptc::add_check_options(command.app(), arguments.request.check);

@@ -5,6 +5,7 @@
 #include "tools/common.h"
 #include "tools/inputs.h"
 #include "tools/options.h"
+#include "tools/parse.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
 #include "tools/values.h"
@@ -39,6 +40,8 @@ constexpr char kExamples[] =
     "  ptcshade room.ptcx --bounces 4 -o lit.ptcx\n"
     "  # Meet an error of 2 %, and measure the error at 1000 points\n"
     "  ptcshade dragon.ptcx --error 2% --check 1000 -o lit.ptcx\n"
+    "  # What would the points reflect if they were rough mirrors, seen from a place?\n"
+    "  ptcshade room.ptcx --glossy 0.3 --eye 0,1.6,4 -o lit.ptcx\n"
     "  # Shade probes from another file under a grey sky\n"
     "  ptcshade room.ptcx --receivers probes.ply --sky 0.4 -o probes-lit.ply\n";
 
@@ -80,6 +83,17 @@ int main(int argc, char** argv) {
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(app, preset);
   ptc::add_surroundings(app, request.gather.around);
+  ptc::add_glossy(app, request.glossy, "channel");
+  app.add_option_function<std::string>(
+         "--eye",
+         [&request](const std::string& text) {
+           const std::vector<double> n = ptc::parse_numbers("--eye", text, {3}, "X,Y,Z");
+           request.eye = glm::dvec3(n[0], n[1], n[2]);
+         },
+         "Place from which --glossy looks [default: camera of a picture]")
+      ->type_name("X,Y,Z")
+      ->needs("--glossy")
+      ->group("Reflections");
   ptc::add_gather_options(app, request.gather, request.lift);
   ptc::add_error_option(app, request.error);
   ptc::add_check_options(app, request.check);

@@ -176,6 +176,7 @@ ordered_json facts_of(const CheckReport& check) {
     facts["estimate"] = {{"occlusion", facts_of(check.estimate->occlusion)},
                          {"irradiance", facts_of(check.estimate->irradiance)}};
   }
+  if (check.reflection) facts["reflection"] = facts_of(*check.reflection);
   if (check.mesh) {
     facts["mesh"] = facts_of(*check.mesh);
     facts["mesh_microseconds"] = check.mesh_microseconds;
@@ -228,9 +229,15 @@ ordered_json facts_of(const LightingReport& report) {
                      {"bounces", report.bounces},
                      {"shade_cpu_seconds", report.shade_cpu_seconds},
                      {"bounce_cpu_seconds", report.bounce_cpu_seconds},
+                     {"glossy_cpu_seconds", report.glossy_cpu_seconds},
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};
   if (report.tuning) facts["tuning"] = facts_of(*report.tuning);
+  if (report.mirrors) {
+    facts["mirrors"] = {{"rays", report.mirrors->rays},
+                        {"noise", report.mirrors->noise},
+                        {"met", report.mirrors->met}};
+  }
   if (report.estimate) facts["estimate"] = facts_of(*report.estimate);
   if (report.check) facts["check"] = facts_of(*report.check);
   if (report.damage) facts["damage"] = damage_facts(report);
@@ -263,11 +270,22 @@ std::string shade_text(const std::string& output, const LightingReport& report) 
                                  100 * report.cache.hit_rate(), stages_text(report.seconds));
   if (report.damage) text += damage_text(report);
   if (report.tuning) text += tuning_text(*report.tuning);
+  if (const auto& mirrors = report.mirrors) {
+    text += fmt::format("  reflections: {:.2f} % measured at pilot receivers with {} rays each\n",
+                        100 * mirrors->noise, mirrors->rays);
+  }
   if (!report.check) return text;
   text += check_line("surfels", report.check->discs);
   if (const auto& estimate = report.check->estimate) {
     text += worth_line("occlusion", estimate->occlusion) +
             worth_line("irradiance", estimate->irradiance);
+  }
+  if (const auto& reflection = report.check->reflection) {
+    text += fmt::format(
+        "  reflections against more rays: occlusion RMS error {:.4f}; radiance RMS error {:.2f} %, "
+        "bias {:+.2f} %\n",
+        reflection->occlusion_rms, 100 * reflection->irradiance_rms,
+        100 * reflection->irradiance_bias);
   }
   if (report.check->mesh) text += check_line("mesh", *report.check->mesh);
   return text;

@@ -30,6 +30,13 @@ struct Shading {
   glm::vec3 sky{0};          ///< from the environment where it is not covered, W/m^2
 };
 
+/// What a receiver's surface would send to an eye if it were a rough mirror that absorbs nothing
+/// (spec/shading.md#glossy). Both are 0 where the eye sees its back.
+struct Reflection {
+  glm::vec3 radiance{0};  ///< of surfaces, with what they emit, and of the sky, W / (m^2 sr)
+  float occlusion = 0;    ///< share of what the mirror shows that surfaces cover, 0 to 1
+};
+
 /// Which sides of a surfel stop light. Radiance always leaves the front alone.
 enum class Sides {
   both,   ///< the back is black, and transparent to receivers within two radii of the centre

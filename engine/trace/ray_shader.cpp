@@ -3,20 +3,23 @@
 #include <algorithm>
 #include <numeric>
 
+#include <glm/geometric.hpp>
+
 #include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/reference/cosine_rays.h"
+#include "engine/shade/reference/lobe_rays.h"
 
 namespace ptc {
 namespace {
 
 std::unique_ptr<PageCache> make_cache(const ContainerReader& scene, const RayOptions& options,
                                       unsigned threads) {
-  const std::uint64_t least = PageCache::min_bytes(scene, threads, options.back_end),
+  const std::uint64_t least = RayShader::least_bytes(scene, threads, options.back_end),
                       decoded = threads * DiscTracer::kBytes;
-  const std::uint64_t left = options.memory_bytes - std::min(options.memory_bytes, decoded);
-  return std::make_unique<PageCache>(scene, CacheOptions{.memory_bytes = std::max(least, left),
-                                                         .threads = threads,
-                                                         .back_end = options.back_end});
+  return std::make_unique<PageCache>(
+      scene, CacheOptions{.memory_bytes = std::max(least, options.memory_bytes) - decoded,
+                          .threads = threads,
+                          .back_end = options.back_end});
 }
 
 }  // namespace
@@ -34,6 +37,7 @@ RayOptions ray_options(const ShadeOptions& options) {
 struct RayShader::Worker {
   DiscTracer tracer;
   std::vector<glm::vec3> directions;
+  LobeRays lobe;
   std::vector<RayHit> hits;
   std::vector<DiscHit> seen;
 };
@@ -59,8 +63,13 @@ CacheStatistics RayShader::cache_statistics() {
   return cache_->statistics();
 }
 
-void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
-                      std::span<Shading> results, Progress& progress) {
+std::uint64_t RayShader::least_bytes(const ContainerReader& scene, unsigned threads,
+                                     BackEnd back_end) {
+  return PageCache::min_bytes(scene, threads, back_end) + threads * DiscTracer::kBytes;
+}
+
+template <class Body>
+void RayShader::for_each_along(std::span<const Receiver> receivers, const Body& body) {
   // Take receivers along the Z-curve, so that neighbours find each other's pages
   std::vector<MortonKey> keys(receivers.size());
   std::ranges::transform(receivers, keys.begin(), [&](const Receiver& receiver) {
@@ -69,27 +78,45 @@ void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::u
   std::vector<std::size_t> along(receivers.size());
   std::iota(along.begin(), along.end(), std::size_t{0});
   std::ranges::stable_sort(along, {}, [&](std::size_t i) { return keys[i]; });
-  const RaysFor wanted = options_.bleeding ? RaysFor::nearest : RaysFor::any;
-
   executor_.for_each(along.size(), [&](std::size_t place, unsigned thread) {
-    // Let the rays of a receiver meet the scene
-    const std::size_t index = along[place];
-    const Receiver& receiver = receivers[index];
-    Worker& own = worker(thread);
-    cosine_directions(receiver.normal, rays, seed + index, own.directions);
-    own.hits.assign(rays, RayHit{});
-    own.tracer.begin(receiver.position, receiver.normal);
-    own.tracer.meet(own.directions, wanted, own.hits);
-    // Sum up what they see
-    own.seen.assign(rays, DiscHit{});
-    for (std::size_t i = 0; i < rays; ++i) {
-      const RayHit& hit = own.hits[i];
-      if (hit.met())
-        own.seen[i] = {hit.depth, options_.bleeding ? own.tracer.radiance(hit, options_.emission)
-                                                    : glm::vec3(0)};
-    }
-    results[index] = sum_rays(receiver, own.directions, own.seen, options_.sky);
+    body(along[place], worker(thread));
+  });
+}
+
+void RayShader::look(Worker& own, const Receiver& receiver, std::span<const glm::vec3> directions,
+                     bool emission) const {
+  own.hits.assign(directions.size(), RayHit{});
+  own.tracer.begin(receiver.position, receiver.normal);
+  own.tracer.meet(directions, options_.bleeding ? RaysFor::nearest : RaysFor::any, own.hits);
+  own.seen.assign(directions.size(), DiscHit{});
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const RayHit& hit = own.hits[i];
+    if (!hit.met()) continue;
+    own.seen[i] = {hit.depth,
+                   options_.bleeding ? own.tracer.radiance(hit, emission) : glm::vec3(0)};
+  }
+}
+
+void RayShader::trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
+                      std::span<Shading> results, Progress& progress) {
+  for_each_along(receivers, [&](std::size_t i, Worker& own) {
+    cosine_directions(receivers[i].normal, rays, seed + i, own.directions);
+    look(own, receivers[i], own.directions, options_.emission);
+    results[i] = sum_rays(receivers[i], own.directions, own.seen, options_.sky);
     progress.advance(1);
+  });
+}
+
+void RayShader::reflect(std::span<const Receiver> receivers, const Mirrors& mirrors,
+                        std::uint64_t seed, std::span<Reflection> results) {
+  const unsigned rays = mirrors.roughness > 0 ? mirrors.rays : 1;
+  for_each_along(receivers, [&](std::size_t i, Worker& own) {
+    const glm::dvec3 way = mirrors.eye - receivers[i].position;
+    const double distance = glm::length(way);
+    const glm::vec3 to_eye = distance > 0 ? glm::vec3(way / distance) : glm::vec3(0);
+    lobe_directions(receivers[i].normal, to_eye, mirrors.roughness, rays, seed + i, own.lobe);
+    look(own, receivers[i], own.lobe.directions, true);
+    results[i] = sum_lobe(own.lobe, own.seen, options_.sky);
   });
 }
 

@@ -30,6 +30,13 @@ struct RayOptions {
   BackEnd back_end = BackEnd::pread;
 };
 
+/// Rough mirrors that an eye looks at.
+struct Mirrors {
+  glm::dvec3 eye{0};    ///< scene units
+  float roughness = 0;  ///< 0 to 1, as for lobe_directions()
+  unsigned rays = 64;   ///< of each receiver
+};
+
 /// Returns the options of rays that find what a shader approximates, under the same cap.
 [[nodiscard]] RayOptions ray_options(const ShadeOptions& options);
 
@@ -37,9 +44,14 @@ struct RayOptions {
 /// as the reference for its own error.
 ///
 /// Results depend on the receivers, the number of rays and the seed alone.
-/// Memory: RayOptions::memory_bytes, and 52 bytes for each ray of a receiver and thread.
+/// Memory: RayOptions::memory_bytes, and kRayBytes for each ray of a receiver and thread.
 class RayShader {
  public:
+  static constexpr std::uint64_t kRayBytes = 64;
+  /// Returns the least that RayOptions::memory_bytes are raised to.
+  [[nodiscard]] static std::uint64_t least_bytes(const ContainerReader& scene, unsigned threads,
+                                                 BackEnd back_end);
+
   /// @param scene, executor  must outlive this
   RayShader(const ContainerReader& scene, const RayOptions& options, const Executor& executor);
   ~RayShader();
@@ -53,6 +65,13 @@ class RayShader {
   void trace(std::span<const Receiver> receivers, unsigned rays, std::uint64_t seed,
              std::span<Shading> results, Progress& progress);
 
+  /// Traces rays in the lobes of receivers that are rough mirrors. What surfaces emit counts, too.
+  /// Receiver i takes `seed` + i.
+  /// @param results  as many as receivers, in their order
+  /// @throws FormatError when a page is damaged; std::system_error
+  void reflect(std::span<const Receiver> receivers, const Mirrors& mirrors, std::uint64_t seed,
+               std::span<Reflection> results);
+
   /// Frees what threads have decoded, and returns what the page cache counted.
   [[nodiscard]] CacheStatistics cache_statistics();
 
@@ -60,6 +79,13 @@ class RayShader {
   struct Worker;
 
   [[nodiscard]] Worker& worker(unsigned thread);
+  /// Calls body(index, worker) for all receivers along the Z-curve, on all threads.
+  template <class Body>
+  void for_each_along(std::span<const Receiver> receivers, const Body& body);
+  /// Finds what rays along `directions` meet, into Worker::seen.
+  /// @param emission  whether what surfaces emit counts
+  void look(Worker& own, const Receiver& receiver, std::span<const glm::vec3> directions,
+            bool emission) const;
 
   const Executor& executor_;
   SceneView view_;

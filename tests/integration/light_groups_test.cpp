@@ -5,18 +5,14 @@
 #include <map>
 #include <numbers>
 
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfInputFile.h>
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
-#include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/ptc.h"
 #include "engine/verify/verify.h"
-#include "format/scalar.h"
+#include "tests/support/channels.h"
 #include "tests/support/notes.h"
 #include "tests/support/scenes.h"
 
@@ -24,44 +20,6 @@ using namespace ptc;
 using namespace ptc::test;
 
 namespace {
-
-/// Values of the channels of three halves of a container, by name, with the points' own light.
-std::map<std::string, std::vector<glm::vec3>> lights_of(const std::filesystem::path& path) {
-  std::map<std::string, std::vector<glm::vec3>> lights;
-  const ContainerReader container(path);
-  ContainerSource source(container);
-  std::vector<Surfel> surfels(1000);
-  while (const std::size_t count = source.next(surfels)) {
-    const std::byte* value = source.attributes().data();
-    for (std::size_t i = 0; i < count; ++i) {
-      lights["own"].push_back(surfels[i].outgoing());
-      lights["albedo"].push_back(surfels[i].albedo);
-      for (const Channel& channel : source.channels()) {
-        glm::vec3 v(0);
-        for (int k = 0; k < channel.components; ++k, value += 2) {
-          std::uint16_t half = 0;
-          std::copy_n(value, 2, reinterpret_cast<std::byte*>(&half));
-          if (channel.components == 3) v[k] = decode_half(half);
-        }
-        if (channel.components == 3) lights[channel.name].push_back(v);
-      }
-    }
-  }
-  return lights;
-}
-
-/// The greatest difference of two lists, over the greatest value.
-double difference(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
-  REQUIRE(a.size() == b.size());
-  double worst = 0, most = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const glm::vec3 d = glm::abs(a[i] - b[i]);
-    worst = std::max<double>(worst, std::max({d.x, d.y, d.z}));
-    most = std::max<double>(most, std::max({b[i].x, b[i].y, b[i].z}));
-  }
-  REQUIRE(most > 0);
-  return worst / most;
-}
 
 std::vector<glm::vec3> sum(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
   std::vector<glm::vec3> both = a;
@@ -118,23 +76,6 @@ ShadeRequest in_groups(const std::filesystem::path& scene) {
   return request;
 }
 
-std::vector<glm::vec3> read_layer(const std::filesystem::path& path, const std::string& layer) {
-  Imf::InputFile file(path.c_str());
-  const auto window = file.header().dataWindow();
-  const auto width = static_cast<std::size_t>(window.max.x + 1),
-             height = static_cast<std::size_t>(window.max.y + 1);
-  std::vector<glm::vec3> pixels(width * height, glm::vec3(-1));
-  Imf::FrameBuffer frame;
-  for (std::size_t k = 0; k < 3; ++k) {
-    frame.insert((layer.empty() ? "" : layer + ".") + "RGB"[k],
-                 Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&pixels[0][static_cast<int>(k)]),
-                            sizeof(glm::vec3), sizeof(glm::vec3) * width));
-  }
-  file.setFrameBuffer(frame);
-  file.readPixels(0, window.max.y);
-  return pixels;
-}
-
 }  // namespace
 
 TEST_CASE("light groups: each is what its lights alone give, and the sum is all light",
@@ -149,11 +90,11 @@ TEST_CASE("light groups: each is what its lights alone give, and the sum is all 
   request.bounces = several_bounces ? 3 : 1;
   const LightingReport report = shade_container(request, dir / "groups.ptcx", silent);
   CHECK(report.receivers == ContainerReader(dir / "room.ptcx").superblock().points);
-  const auto groups = lights_of(dir / "groups.ptcx");
+  const auto groups = values_of(dir / "groups.ptcx");
   REQUIRE(groups.count("light_key") == 1);
   REQUIRE(groups.count("light_fill") == 1);
   REQUIRE(groups.count("light_rest") == 1);
-  CHECK(groups.size() == 9);
+  CHECK(groups.size() == 10);
   CHECK(verify_container(dir / "groups.ptcx", {.level = VerifyLevel::rebuild}, silent).sound());
 
   // The sum is what leaves the points, and what a run with all lights finds
@@ -162,7 +103,7 @@ TEST_CASE("light groups: each is what its lights alone give, and the sum is all 
   CHECK(difference(all, leaving(groups)) < 0.003);
   request.light_groups = false;
   shade_container(request, dir / "plain.ptcx", silent);
-  const auto plain = lights_of(dir / "plain.ptcx");
+  const auto plain = values_of(dir / "plain.ptcx");
   CHECK(difference(all, leaving(plain)) < 0.01);
   CHECK(difference(groups.at("bent_normal"), plain.at("bent_normal")) == 0);
 
@@ -177,7 +118,7 @@ TEST_CASE("light groups: each is what its lights alone give, and the sum is all 
   relight(dir / "dark.ptcx", dir / "fill.ptcx", fill);
   request.scene = dir / "fill.ptcx";
   shade_container(request, dir / "shaded.ptcx", silent);
-  const auto alone = lights_of(dir / "shaded.ptcx");
+  const auto alone = values_of(dir / "shaded.ptcx");
   CHECK(difference(groups.at("light_fill"), leaving(alone)) < 0.003);
 }
 
@@ -193,7 +134,7 @@ TEST_CASE("light groups: a plane under the sky alone has the light of the formul
   relight(dir / "plane.ptcx", dir / "lit.ptcx", rig);
   Progress silent;
   shade_container(in_groups(dir / "lit.ptcx"), dir / "groups.ptcx", silent);
-  const auto groups = lights_of(dir / "groups.ptcx");
+  const auto groups = values_of(dir / "groups.ptcx");
   for (const glm::vec3& light : groups.at("light_fill"))
     CHECK(light.g == Approx(0.5F).epsilon(0.01));
 }
@@ -206,7 +147,7 @@ TEST_CASE("light groups: what emits is part of the rest", "[integration][groups]
   relight(dir / "room.ptcx", dir / "lit.ptcx", rig);
   Progress silent;
   shade_container(in_groups(dir / "lit.ptcx"), dir / "groups.ptcx", silent);
-  const auto groups = lights_of(dir / "groups.ptcx");
+  const auto groups = values_of(dir / "groups.ptcx");
   float key = 0, rest = 0;
   for (const glm::vec3& v : groups.at("light_key")) key = std::max(key, v.r);
   for (const glm::vec3& v : groups.at("light_rest")) rest = std::max(rest, v.r);
@@ -216,7 +157,7 @@ TEST_CASE("light groups: what emits is part of the rest", "[integration][groups]
   write_scene(dir / "dark.ptcx", room(false));
   relight(dir / "dark.ptcx", dir / "lit.ptcx", rig);
   shade_container(in_groups(dir / "lit.ptcx"), dir / "groups.ptcx", silent);
-  CHECK(lights_of(dir / "groups.ptcx").count("light_rest") == 0);
+  CHECK(values_of(dir / "groups.ptcx").count("light_rest") == 0);
 }
 
 TEST_CASE("light groups: threads and caps change no byte, and files of points have the channels",
@@ -274,13 +215,13 @@ TEST_CASE("light groups: receivers of their own get the light of each", "[integr
   ShadeRequest request = in_groups(dir / "lit.ptcx");
   request.receivers = dir / "probes.ptcx";
   shade_container(request, dir / "groups.ptcx", silent);
-  const auto groups = lights_of(dir / "groups.ptcx");
+  const auto groups = values_of(dir / "groups.ptcx");
   const auto all =
       sum(sum(groups.at("light_key"), groups.at("light_fill")), groups.at("light_rest"));
   CHECK(difference(all, groups.at("indirect")) < 0.003);
   request.light_groups = false;
   shade_container(request, dir / "plain.ptcx", silent);
-  CHECK(difference(all, lights_of(dir / "plain.ptcx").at("indirect")) < 0.01);
+  CHECK(difference(all, values_of(dir / "plain.ptcx").at("indirect")) < 0.01);
 }
 
 TEST_CASE("light groups: the layers of a picture add up to its beauty", "[integration][groups]") {

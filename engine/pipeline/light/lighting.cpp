@@ -5,6 +5,7 @@
 //   tune()      rays, gathers, rays       a cache for each, one after another
 //   shade()     Shader, Estimator         one cache for both
 //               or rays                   a cache
+//               and rays for reflections  the same, or a share of a quarter
 //   check()     rays                      a cache; finish() has freed that of shade()
 #include "engine/pipeline/light/lighting.h"
 
@@ -42,6 +43,12 @@ void check_combination(const LightingRequest& request) {
     throw RequestError("tolerate_damage",
                        "`tolerate_damage` excludes `error` and `check`: their rays read every "
                        "point. Salvage the scene first");
+  }
+  if (request.glossy.roughness) {
+    throw RequestError(
+        "tolerate_damage",
+        "`tolerate_damage` excludes `glossy.roughness`: its rays read every point. Salvage the "
+        "scene first");
   }
 }
 
@@ -100,6 +107,11 @@ void check_ranges(const LightingRequest& request) {
   require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
                   "`check.rays` is not 1 to 16777216");
   require_request(request.bounces <= kMaxBounces, "bounces", "`bounces` is above 1000");
+  require_request(!request.glossy.roughness ||
+                      (*request.glossy.roughness >= 0 && *request.glossy.roughness <= 1),
+                  "glossy.roughness", "`glossy.roughness` is not 0 to 1");
+  require_request(request.glossy.rays <= kMaxRays, "glossy.rays",
+                  "`glossy.rays` is above 16777216");
   require_request(std::isfinite(request.lift) && request.lift >= 0, "lift",
                   "`lift` is not 0 or more and finite");
 }
@@ -117,11 +129,20 @@ Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progr
 Lighting::~Lighting() = default;
 
 void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
-                       const std::filesystem::path& target) {
+                       const glm::dvec3& eye, const std::filesystem::path& target) {
   charge_bounces(budget, scene_, request_.bounces, executor_.threads());
+  const unsigned readers = readers_of(executor_, request_.estimate);
+  if (request_.glossy.roughness) {
+    mirrors_ = {.eye = eye,
+                .roughness = *request_.glossy.roughness,
+                .rays = request_.glossy.rays > 0 ? request_.glossy.rays : kMirrorRays};
+    const std::uint64_t most_rays = request_.error ? kMostMirrorRays : mirrors_.rays;
+    mirror_bytes_ = RayShader::least_bytes(scene_, executor_.threads(), request_.back_end) +
+                    executor_.threads() * RayShader::kRayBytes * most_rays;
+    budget.charge("rays of mirrors", mirror_bytes_);
+  }
   options_ = {
-      .cache_bytes = cache_bytes_left(std::move(budget), scene_,
-                                      readers_of(executor_, request_.estimate), request_.back_end),
+      .cache_bytes = cache_bytes_left(std::move(budget), scene_, readers, request_.back_end),
       .back_end = request_.back_end,
       .gather = request_.gather,
       .sky = sky_function(sky),
@@ -143,8 +164,10 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
 
 void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
   ReceiverPlaces compared;
+  std::vector<Receiver> pilots_compared;
   if (request_.error || request_.estimate) {
     const std::vector<Pilot> pilots = find_pilots();
+    pilots_compared = compared_of(pilots);
     std::vector<Shading> traced;  // two results by rays for each compared receiver
 
     // Choose the settings
@@ -174,31 +197,54 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
 
   // Start the sample for check(), without the pilots, and the gather or the rays
   sample_.emplace(request_.check, std::move(compared));
+  RayOptions with = ray_options(options_);
   if (receiver_rays() > 0) {
-    rays_ = std::make_unique<RayShader>(lit(), ray_options(options_), executor_);
+    with.memory_bytes += mirror_bytes_;
   } else {
+    if (request_.glossy.roughness) {
+      // Mirrors take a quarter of what a gather can spare
+      const std::uint64_t least =
+          PageCache::min_bytes(scene_, readers_of(executor_, request_.estimate), request_.back_end);
+      const std::uint64_t share = estimator_ ? 0 : (options_.cache_bytes - least) / 4;
+      options_.cache_bytes -= share;
+      with.memory_bytes = mirror_bytes_ + share;
+    }
     shader_ = std::make_unique<Shader>(lit(), options_, executor_);
+  }
+  if (receiver_rays() > 0 || request_.glossy.roughness)
+    rays_ = std::make_unique<RayShader>(lit(), with, executor_);
+  if (request_.glossy.roughness && request_.error && request_.glossy.rays == 0) {
+    const Stage stage(report_.seconds, progress_, "tune reflections", 0, "receivers");
+    report_.mirrors = tune_mirrors(*rays_, pilots_compared, mirrors_, *request_.error);
+    mirrors_.rays = report_.mirrors->rays;
   }
 }
 
 LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned variant) {
   results_.resize(receivers.size());
   const double before = cpu_seconds();
-  if (rays_) {
+  if (receiver_rays() > 0) {
     rays_->trace(receivers, receiver_rays(), kRunSeed + report_.receivers, results_, progress_);
   } else {
     shader_->shade(receivers, results_, progress_, variant);
   }
-  report_.receivers += receivers.size();
   report_.shade_cpu_seconds += cpu_seconds() - before;
   LitReceivers lit{.shading = results_};
+  if (request_.glossy.roughness) {
+    const double start = cpu_seconds();
+    reflections_.resize(receivers.size());
+    rays_->reflect(receivers, mirrors_, kRunSeed + report_.receivers, reflections_);
+    report_.glossy_cpu_seconds += cpu_seconds() - start;
+    lit.reflections = reflections_;
+  }
+  report_.receivers += receivers.size();
   if (estimator_) lit.estimates = estimator_->estimate(receivers, results_, variant);
-  sample_->add(receivers, lit.shading, lit.estimates);
+  sample_->add(receivers, lit);
   return lit;
 }
 
 void Lighting::finish() {
-  if (rays_) {
+  if (!shader_) {
     report_.cache = rays_->cache_statistics();
   } else {
     report_.gather = shader_->counts();
@@ -218,7 +264,8 @@ void Lighting::check(const CheckScene& seen) {
   if (request_.check.receivers == 0) return;
   const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
   const Stage stage(report_.seconds, progress_, "check", references, "references");
-  report_.check = sample_->compare(lit(), ray_options(options_), seen, executor_, progress_);
+  report_.check =
+      sample_->compare(lit(), ray_options(options_), mirrors_, seen, executor_, progress_);
 }
 
 }  // namespace ptc

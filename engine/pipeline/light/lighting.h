@@ -22,6 +22,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/quality/check.h"
 #include "engine/pipeline/quality/estimate.h"
+#include "engine/pipeline/quality/mirror_rays.h"
 #include "engine/pipeline/quality/tuning.h"
 #include "engine/pipeline/run.h"
 #include "engine/scene/sampling/sampler.h"
@@ -31,6 +32,15 @@
 #include "engine/trace/ray_shader.h"
 
 namespace ptc {
+
+/// A request for what surfaces would reflect if they were rough mirrors (spec/shading.md#glossy).
+struct GlossyRequest {
+  /// Roughness, 0 to 1, as glTF and most renderers have it; 0 is a polished mirror. Empty: nothing
+  /// is reflected.
+  std::optional<float> roughness;
+  /// Rays of each receiver, 1 or more; 0: as many as meet LightingRequest::error, or kMirrorRays.
+  unsigned rays = 0;
+};
 
 /// The common part of the requests to shade points and to render a picture: the scene whose surfels
 /// light the receivers, the quality and the resources.
@@ -59,6 +69,7 @@ struct LightingRequest {
   std::optional<double> error;
   /// Estimates the error of every receiver, for about twice the time. Needs `error` or `check`.
   bool estimate = false;
+  GlossyRequest glossy;
   float lift = 0.15F;  ///< height of a receiver above its surfel, in radii of the surfel
   BackEnd back_end = BackEnd::pread;  ///< how pages are read
   /// Shades past pages of the scene that break a rule, and reports them. Excludes `error`, `check`
@@ -88,19 +99,15 @@ struct LightingReport {
   unsigned bounces = 1;                    ///< as LightingRequest::bounces
   double shade_cpu_seconds = 0;            ///< CPU time of the last bounce, all threads
   double bounce_cpu_seconds = 0;           ///< CPU time of earlier bounces' gathers, all threads
+  double glossy_cpu_seconds = 0;           ///< CPU time of reflections, all threads
   GatherCounts gather;                     ///< work of the last bounce's gather; none by rays
   CacheStatistics cache;                   ///< page cache of the last bounce
   std::optional<TuningReport> tuning;      ///< present when an error was asked for
+  std::optional<MirrorTuning> mirrors;     ///< present when it chose the rays of reflections
   std::optional<EstimateReport> estimate;  ///< present when estimates were asked for
   std::optional<CheckReport> check;        ///< present when a check was asked for
   std::optional<DamageReport> damage;      ///< present when damage was tolerated
   StageSeconds seconds;                    ///< wall time of each stage
-};
-
-/// The results for a block of receivers. The spans belong to a Lighting.
-struct LitReceivers {
-  std::span<const Shading> shading;
-  std::span<const ErrorEstimate> estimates;  ///< empty when no estimates were asked for
 };
 
 /// One run of the gather, phase by phase: prepare(), tune(), shade() any number of times, finish(),
@@ -130,11 +137,12 @@ class Lighting {
   /// @param emission  whether receivers gather what surfaces emit; false where rays bring the light
   ///                  of emitters
   /// @param variants  as ShadeOptions::variants
+  /// @param eye       from where receivers are looked at, scene units; for reflections alone
   /// @param target    output of the run; its directory gets temporary files when the request names
   ///                  no directories for them
   /// @throws LimitError when the cap is too small; FormatError, std::system_error
   void prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
-               const std::filesystem::path& target);
+               const glm::dvec3& eye, const std::filesystem::path& target);
 
   /// Chooses the settings and prepares the estimates, as far as the request asks for them.
   /// @param find_pilots  returns receivers that stand for the run; called only when needed
@@ -177,9 +185,12 @@ class Lighting {
   bool has_sky_map_ = false;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
-  std::unique_ptr<RayShader> rays_;  ///< null where the gather does
+  std::unique_ptr<RayShader> rays_;  ///< null where the gather shades, and nothing is reflected
+  Mirrors mirrors_;
+  std::uint64_t mirror_bytes_ = 0;  ///< of rays_ beside a gather
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
+  std::vector<Reflection> reflections_;
 
   /// The container that receivers look at.
   [[nodiscard]] const ContainerReader& lit() const noexcept {

@@ -2,6 +2,7 @@
 
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/mirror_rays.h"
 #include "engine/trace/ray_shader.h"
 
 namespace ptc {
@@ -25,8 +26,7 @@ double cpu_microseconds(std::size_t count, const Body& body) {
 
 }  // namespace
 
-void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shading> results,
-                      std::span<const ErrorEstimate> estimates) {
+void CheckSample::add(std::span<const Receiver> receivers, const LitReceivers& lit) {
   if (request_.receivers == 0) return;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     const bool filling = receivers_.size() < request_.receivers;
@@ -36,17 +36,19 @@ void CheckSample::add(std::span<const Receiver> receivers, std::span<const Shadi
     if (filling) {
       receivers_.emplace_back();
       results_.emplace_back();
-      if (!estimates.empty()) estimates_.emplace_back();
+      if (!lit.estimates.empty()) estimates_.emplace_back();
+      if (!lit.reflections.empty()) reflections_.emplace_back();
     }
     receivers_[slot] = receivers[i];
-    results_[slot] = results[i];
-    if (!estimates.empty()) estimates_[slot] = estimates[i];
+    results_[slot] = lit.shading[i];
+    if (!lit.estimates.empty()) estimates_[slot] = lit.estimates[i];
+    if (!lit.reflections.empty()) reflections_[slot] = lit.reflections[i];
   }
 }
 
 CheckReport CheckSample::compare(const ContainerReader& scene, const RayOptions& options,
-                                 const CheckScene& seen, const Executor& executor,
-                                 Progress& progress) const {
+                                 const Mirrors& mirrors, const CheckScene& seen,
+                                 const Executor& executor, Progress& progress) const {
   // Shoot half of the rays from each of two copies: independent halves give the noise of the rays
   CheckReport report{.receivers = receivers_.size(), .rays = request_.rays};
   if (receivers_.empty()) return report;
@@ -59,8 +61,15 @@ CheckReport CheckSample::compare(const ContainerReader& scene, const RayOptions&
     RayShader discs(scene, options, executor);
     report.disc_microseconds =
         cpu_microseconds(receivers_.size(), [&] { discs.trace(twice, half, 0, traced, progress); });
+    report.discs = errors(results_, traced);
+    if (!reflections_.empty()) {
+      Mirrors more = mirrors;
+      more.rays = half;
+      std::vector<Reflection> reflected(twice.size());
+      discs.reflect(twice, more, 0, reflected);
+      report.reflection = errors(as_shading(reflections_), as_shading(reflected));
+    }
   }
-  report.discs = errors(results_, traced);
   if (!estimates_.empty()) report.estimate = check_estimates(estimates_, results_, traced);
 
   // Trace rays at the mesh

@@ -34,9 +34,12 @@ struct CheckReport {
   unsigned rays = 0;                      ///< rays for each receiver
   CheckError discs;                       ///< errors against rays at the same surfels
   std::optional<EstimateCheck> estimate;  ///< quality of the estimates, when the run made some
-  std::optional<CheckError> mesh;         ///< errors against rays at the mesh, when there is one
-  double disc_microseconds = 0;           ///< CPU time of one receiver's rays at the surfels
-  double mesh_microseconds = 0;           ///< CPU time of one receiver's rays at the mesh
+  /// Errors of reflections against more rays at the surfels, when the run made some. The members of
+  /// irradiance are about radiance, W / (m^2 sr).
+  std::optional<CheckError> reflection;
+  std::optional<CheckError> mesh;  ///< errors against rays at the mesh, when there is one
+  double disc_microseconds = 0;    ///< CPU time of one receiver's rays at the surfels
+  double mesh_microseconds = 0;    ///< CPU time of one receiver's rays at the mesh
 };
 
 /// The mesh that the rays of a check meet, besides the surfels of the scene, and its light.
@@ -44,6 +47,13 @@ struct CheckScene {
   const RayScene* mesh = nullptr;      ///< mesh of the picture; null: no rays at a mesh
   const DirectLight* light = nullptr;  ///< direct light at the mesh
   LightPaths paths;                    ///< paths of the light that rays at the mesh follow
+};
+
+/// The results for a block of receivers. The spans belong to a Lighting.
+struct LitReceivers {
+  std::span<const Shading> shading;
+  std::span<const ErrorEstimate> estimates;  ///< empty when no estimates were asked for
+  std::span<const Reflection> reflections;   ///< empty when none were asked for
 };
 
 /// An even sample of a run's receivers with their shading. The same receivers in the same order
@@ -56,18 +66,17 @@ class CheckSample {
       : request_(request), apart_(std::move(apart)) {}
 
   /// Offers shaded receivers to the sample.
-  /// @param estimates  one for each receiver; empty when the run makes none
-  void add(std::span<const Receiver> receivers, std::span<const Shading> results,
-           std::span<const ErrorEstimate> estimates = {});
+  void add(std::span<const Receiver> receivers, const LitReceivers& lit);
 
   /// Traces rays at the sampled receivers and compares.
   /// @param scene     the container that the receivers were shaded from
   /// @param options   of the rays at the surfels
+  /// @param mirrors   as they were for reflections, if the sample has any
   /// @param progress  advances by one for each half of a receiver's reference: by two for each
   ///                  receiver at the surfels, and by two more at the mesh
   [[nodiscard]] CheckReport compare(const ContainerReader& scene, const RayOptions& options,
-                                    const CheckScene& seen, const Executor& executor,
-                                    Progress& progress) const;
+                                    const Mirrors& mirrors, const CheckScene& seen,
+                                    const Executor& executor, Progress& progress) const;
 
  private:
   CheckRequest request_;
@@ -77,6 +86,7 @@ class CheckSample {
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
   std::vector<ErrorEstimate> estimates_;
+  std::vector<Reflection> reflections_;
 };
 
 }  // namespace ptc

@@ -24,18 +24,25 @@ std::vector<float> flatten(const std::vector<glm::vec3>& values) {
 
 }  // namespace
 
-Film::Film(unsigned width, unsigned height, bool estimates) : width_(width), height_(height) {
+Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
+    : width_(width), height_(height) {
   const std::size_t pixels = std::size_t{width} * height;
   for (auto* layer : {&beauty_, &direct_, &indirect_, &bent_normal_, &albedo_}) {
     layer->resize(pixels, glm::vec3(0));
   }
   for (auto* layer : {&occlusion_, &alpha_}) layer->resize(pixels, 0);
-  if (!estimates) return;
-  for (auto* layer : {&occlusion_error_, &irradiance_error_}) layer->resize(pixels, 0);
+  if (extras.estimates) {
+    for (auto* layer : {&occlusion_error_, &irradiance_error_}) layer->resize(pixels, 0);
+  }
+  if (extras.glossy) {
+    reflection_.resize(pixels, glm::vec3(0));
+    reflection_occlusion_.resize(pixels, 0);
+  }
 }
 
-std::uint64_t Film::pixel_bytes(bool estimates) noexcept {
-  return 5 * sizeof(glm::vec3) + (estimates ? 4 : 2) * sizeof(float);
+std::uint64_t Film::pixel_bytes(const FilmExtras& extras) noexcept {
+  return 5 * sizeof(glm::vec3) + (extras.estimates ? 4 : 2) * sizeof(float) +
+         (extras.glossy ? sizeof(glm::vec3) + sizeof(float) : 0);
 }
 
 void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight) {
@@ -54,6 +61,11 @@ void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading,
 void Film::add(std::size_t pixel, const ErrorEstimate& estimate, float weight) {
   occlusion_error_[pixel] += weight * estimate.occlusion * estimate.occlusion;
   irradiance_error_[pixel] += weight * estimate.irradiance * estimate.irradiance;
+}
+
+void Film::add(std::size_t pixel, const Reflection& reflection, float weight) {
+  reflection_[pixel] += weight * reflection.radiance;
+  reflection_occlusion_[pixel] += weight * reflection.occlusion;
 }
 
 void Film::add_group(const std::string& layer, const Film& group) {
@@ -99,6 +111,10 @@ void Film::write_exr(const std::filesystem::path& target) const {
     layers.push_back({"occlusion_error", Kind::scalar, true, occlusion_error_});
     layers.push_back({"irradiance_error", Kind::scalar, true, irradiance_error_});
   }
+  if (!reflection_.empty()) {
+    layers.push_back({"reflection", Kind::colour, false, flatten(reflection_)});
+    layers.push_back({"reflection_occlusion", Kind::scalar, false, reflection_occlusion_});
+  }
   for (const auto& [name, light] : groups_)
     layers.push_back({name, Kind::colour, false, flatten(light)});
   ptc::write_exr(target, width_, height_, layers);
@@ -109,10 +125,11 @@ void Film::write_png(const PictureTarget& target, float exposure) const {
   if (target.layer == "occlusion") {
     for (const float occlusion : occlusion_) image.pixels.emplace_back(1 - occlusion);
   } else {
-    image.pixels = target.layer == "direct"     ? direct_
-                   : target.layer == "indirect" ? indirect_
-                   : target.layer == "albedo"   ? albedo_
-                                                : beauty_;
+    image.pixels = target.layer == "direct"       ? direct_
+                   : target.layer == "indirect"   ? indirect_
+                   : target.layer == "albedo"     ? albedo_
+                   : target.layer == "reflection" ? reflection_
+                                                  : beauty_;
     const float gain = target.layer == "albedo" ? 1 : std::exp2(exposure);
     for (glm::vec3& pixel : image.pixels) pixel *= gain;
   }

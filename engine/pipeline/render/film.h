@@ -19,8 +19,8 @@
 namespace ptc {
 
 /// The layers that a .png can show; `occlusion` is white where nothing covers.
-inline constexpr std::array<std::string_view, 5> kPictureLayers{"beauty", "direct", "indirect",
-                                                                "occlusion", "albedo"};
+inline constexpr std::array<std::string_view, 6> kPictureLayers{
+    "beauty", "direct", "indirect", "occlusion", "albedo", "reflection"};
 
 /// A picture file and the layer that it shows.
 struct PictureTarget {
@@ -29,20 +29,25 @@ struct PictureTarget {
   std::string layer = "beauty";
 };
 
+/// Layers that a picture has only when they are asked for.
+struct FilmExtras {
+  bool estimates = false;  ///< occlusion_error and irradiance_error
+  bool glossy = false;     ///< reflection and reflection_occlusion
+};
+
 /// The layers of a picture: weighted means over the samples of every pixel, row 0 at the top.
 /// Memory: pixel_bytes() for each pixel.
 class Film {
  public:
   /// Makes a black picture.
   /// @param width, height  in pixels
-  /// @param estimates      adds the layers occlusion_error and irradiance_error
-  Film(unsigned width, unsigned height, bool estimates);
+  Film(unsigned width, unsigned height, const FilmExtras& extras);
 
   [[nodiscard]] unsigned width() const noexcept { return width_; }    ///< pixels
   [[nodiscard]] unsigned height() const noexcept { return height_; }  ///< pixels
 
   /// Returns the bytes of memory that a pixel takes.
-  [[nodiscard]] static std::uint64_t pixel_bytes(bool estimates) noexcept;
+  [[nodiscard]] static std::uint64_t pixel_bytes(const FilmExtras& extras) noexcept;
   /// The bytes of memory that a pixel takes for each group of lights.
   static constexpr std::uint64_t kGroupBytes = sizeof(glm::vec3);
 
@@ -53,6 +58,9 @@ class Film {
   /// Adds the estimated error of a sample that meets a surface.
   /// @pre the film has estimates
   void add(std::size_t pixel, const ErrorEstimate& estimate, float weight);
+  /// Adds the reflection of a sample that meets a surface.
+  /// @pre the film has reflections
+  void add(std::size_t pixel, const Reflection& reflection, float weight);
   /// Adds a sample that meets nothing but the sky.
   /// @param radiance  W / (m^2 sr)
   void add_sky(std::size_t pixel, const glm::vec3& radiance, float weight) {
@@ -62,7 +70,7 @@ class Film {
   /// Adds a picture of what one group of lights brings. Its beauty becomes a layer, light adds up,
   /// and what all groups have in common is kept.
   /// @param layer  name of the group's layer
-  /// @pre same size, no estimates
+  /// @pre same size, no extras
   void add_group(const std::string& layer, const Film& group);
 
   /// Completes the layers of estimates: mean squares become root mean squares. Nothing can be added
@@ -84,6 +92,8 @@ class Film {
   std::vector<std::pair<std::string, std::vector<glm::vec3>>> groups_;  ///< layers by name
   /// Mean squares until finish(), root mean squares afterwards; empty without estimates.
   std::vector<float> occlusion_error_, irradiance_error_;
+  std::vector<glm::vec3> reflection_;        ///< empty without reflections
+  std::vector<float> reflection_occlusion_;  ///< empty without reflections
 };
 
 }  // namespace ptc

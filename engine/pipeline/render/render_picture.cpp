@@ -148,14 +148,20 @@ void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
                               lighting.executor(), progress);
 }
 
+FilmExtras extras_of(const RenderRequest& request) {
+  return {.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+}
+
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
 MemoryBudget picture_budget(const RenderRequest& request, const Part& part,
                             const Subject& subject) {
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
-  const std::uint64_t receiver = kReceiverBytes + (request.estimate ? kEstimateBytes : 0);
+  const bool glossy = request.glossy.roughness.has_value();
+  const std::uint64_t receiver =
+      kReceiverBytes + (request.estimate ? kEstimateBytes : 0) + (glossy ? sizeof(Reflection) : 0);
   budget.charge("a tile", std::uint64_t{kTileSide} * kTileSide * receiver);
   budget.charge("the picture",
-                subject.pixels() * (Film::pixel_bytes(request.estimate) + part.held_bytes));
+                subject.pixels() * (Film::pixel_bytes(extras_of(request)) + part.held_bytes));
   if (subject.rays) {
     charge_mesh(budget, subject.mesh, subject.rays.get());
   } else {
@@ -274,6 +280,7 @@ class TileRenderer {
       const std::size_t pixel = std::size_t{y} * subject_.camera.width + x;
       if (hits_[i]) {
         if (!lit.estimates.empty()) film_.add(pixel, lit.estimates[next], weight);
+        if (!lit.reflections.empty()) film_.add(pixel, lit.reflections[next], weight);
         film_.add(pixel, *hits_[i], lit.shading[next++], weight);
       } else {
         const auto [sx, sy] = sample_at(x, y, sample, side);
@@ -312,8 +319,9 @@ void check_names(const RenderRequest& request, std::span<const PictureTarget> ta
 }
 
 /// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
-///         when a layer is unknown, or when estimates or groups have no .exr to go to
-void check_targets(std::span<const PictureTarget> targets, bool estimate, bool groups) {
+///         when a layer is unknown or not asked for, or when estimates or groups have no .exr to go
+///         to
+void check_targets(const RenderRequest& request, std::span<const PictureTarget> targets) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool exr = false;
   for (const PictureTarget& target : targets) {
@@ -325,14 +333,19 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate, bool g
     if (std::ranges::find(kPictureLayers, target.layer) == kPictureLayers.end()) {
       throw RequestError("targets", "a picture has no layer '" + target.layer + "' for a .png");
     }
+    if (target.layer == "reflection" && ending == ".png" && !request.glossy.roughness) {
+      throw RequestError(
+          "targets",
+          "the layer 'reflection' needs a roughness: ask for `glossy.roughness` as well");
+    }
     exr |= ending == ".exr";
   }
-  if (groups && !exr) {
+  if (request.light_groups && !exr) {
     throw RequestError("light_groups",
                        "`light_groups` adds layers, which only an .exr has: name "
                        "an .exr as output");
   }
-  if (estimate && !exr) {
+  if (request.estimate && !exr) {
     throw RequestError("estimate",
                        "`estimate` adds layers, which only an .exr has: name an .exr as output");
   }
@@ -341,7 +354,7 @@ void check_targets(std::span<const PictureTarget> targets, bool estimate, bool g
 /// Checks what can be checked before any file is read.
 /// @throws RequestError
 void check_request(const RenderRequest& request, std::span<const PictureTarget> targets) {
-  check_targets(targets, request.estimate, request.light_groups);
+  check_targets(request, targets);
   if (request.lights) check_lights(*request.lights);
   if (request.camera) check_camera(*request.camera, "camera");
   static_cast<void>(side_of(request.samples));
@@ -366,9 +379,10 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   // Divide the memory, shade earlier bounces, choose the settings
   const bool by_emitters = sees_mesh ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
   lighting.prepare(picture_budget(request, part, subject), lights.sky, !by_emitters,
-                   std::min(request.samples, kMaxVariants), targets.front().path);
+                   std::min(request.samples, kMaxVariants), subject.camera.position,
+                   targets.front().path);
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
-  Film film(subject.camera.width, subject.camera.height, request.estimate);
+  Film film(subject.camera.width, subject.camera.height, extras_of(request));
   lighting.tune([&] { return pilots_of(subject, lighting.executor()); });
 
   // Render all samples into the film
@@ -401,7 +415,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
       may_emit(scene) ||
       load_meshes(request.meshes, request.mesh.get(), false, silent, nullptr, "meshes").emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
-  const std::uint64_t sum_bytes = Film::pixel_bytes(false) + groups.size() * Film::kGroupBytes;
+  const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
   LightingReport report;
   std::unique_ptr<Film> sum;
   std::uint64_t held = ContainerReader::kPageBytes * scene.page_count();
@@ -418,7 +432,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     one.scene = lit.path();
     const auto add = [&](const Film& film) {
       if (!sum) {
-        sum = std::make_unique<Film>(film.width(), film.height(), false);
+        sum = std::make_unique<Film>(film.width(), film.height(), FilmExtras{});
         held += sum_bytes * film.width() * film.height();
       }
       sum->add_group(group_channel(group), film);

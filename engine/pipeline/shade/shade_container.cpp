@@ -29,6 +29,7 @@
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/light/group_scenes.h"
 #include "engine/pipeline/point_input.h"
+#include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shaded_groups.h"
 #include "engine/pipeline/shade/shaded_sink.h"
@@ -143,7 +144,18 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g, u
     text += fmt::format(" distance {} falloff {}", around.distance, around.falloff);
   if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
   if (request.estimate) text += " estimates";
+  if (request.glossy.roughness) text += fmt::format(" glossy {}", *request.glossy.roughness);
   return text;
+}
+
+ShadedExtras extras_of(const ShadeRequest& request) {
+  return {.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+}
+
+/// Returns the place from which mirrors are looked at.
+glm::dvec3 eye_of(const ShadeRequest& request, const ContainerReader& scene) {
+  if (!request.glossy.roughness) return glm::dvec3(0);
+  return request.eye ? *request.eye : default_camera(scene, {}, {}, {}).position;
 }
 
 /// The open container of a request's receivers.
@@ -281,7 +293,7 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
   while (const std::size_t count = cursor.next(surfels, &rows)) {
     lifting.place(std::span(surfels).first(count), rows, batch);
     const LitReceivers lit = lighting.shade(std::span(batch).first(count));
-    sink.write(std::span(surfels).first(count), rows, lit.shading, lit.estimates, {});
+    sink.write(std::span(surfels).first(count), rows, lit, {});
   }
 }
 
@@ -303,17 +315,18 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   Lighting lighting(request, report, progress);
   const OpenReceivers receivers(request, target, lighting, progress);
   check_count(receivers, target);
-  const ShadedExtras extras{.estimates = request.estimate};
+  const ShadedExtras extras = extras_of(request);
   check_shaded_sink(target, receivers.container, extras);
   const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
 
   // Divide the memory, shade earlier bounces, choose the settings
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");
   if (receivers.other) charge_directory(budget, *receivers.other);
-  budget.charge("the output's directory", sink_bytes(target, receivers.container));
+  budget.charge("the output's directory",
+                sink_bytes(target, receivers.container, later_channels(extras)));
   // The light that emitters gave the scene's own points is in their radiance
   const bool emission = receivers.other || !lit_by_emitters(lighting.scene());
-  lighting.prepare(std::move(budget), sky, emission, 1, target);
+  lighting.prepare(std::move(budget), sky, emission, 1, eye_of(request, lighting.scene()), target);
   lighting.tune([&] { return pilots_of(receivers, request.lift); });
 
   // Shade all receivers into the target
@@ -346,7 +359,7 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
   if (!request.colour_from.empty()) {
     PointWriteInfo info =
         shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
-    ShadedExtras extras{.estimates = request.estimate};
+    ShadedExtras extras = extras_of(request);
     if (request.light_groups) {
       const ContainerReader scene(request.scene);
       extras.groups = groups_of(request, recorded_rig(scene), may_emit(scene));

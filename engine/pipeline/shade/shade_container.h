@@ -37,8 +37,11 @@ struct ShadeRequest : LightingRequest {
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
   /// Keeps the light of each group of lights apart, in a channel for each: `count` and `sky` keep
-  /// their defaults then, as do `error`, `estimate`, `check` and `tolerate_damage`.
+  /// their defaults then, as do `error`, `estimate`, `glossy`, `check` and `tolerate_damage`.
   bool light_groups = false;
+  /// Place from which mirrors are looked at, scene units; empty: that of the camera of a picture of
+  /// the scene.
+  std::optional<glm::dvec3> eye;
   /// Sky that lights the receivers; empty: the sky that the scene was built with.
   std::optional<Sky> sky;
 };
@@ -53,6 +56,8 @@ struct ShadeRequest : LightingRequest {
 ///   indirect           3   albedo / pi * (irradiance + sky): the radiance that leaves
 ///   occlusion_error    1   estimated error, only with LightingRequest::estimate
 ///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
+///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
+///   reflection_occlusion 1  only with LightingRequest::glossy, 0 to 1
 ///   light_NAME         3   only with `light_groups`: all radiance of a point that is due to a
 ///                          group, W / (m^2 sr)
 ///

@@ -109,7 +109,7 @@ void add_up(const ContainerReader& base, std::deque<ShadedGroup>& groups, bool o
             (own ? groups[g].own(i) : glm::vec3(0));
       }
     }
-    sink.write(std::span(surfels).first(count), points.attributes(), sums, {}, lights);
+    sink.write(std::span(surfels).first(count), points.attributes(), {.shading = sums}, lights);
     progress.advance(count);
   }
 }

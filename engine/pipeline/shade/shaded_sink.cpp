@@ -1,7 +1,8 @@
 // Shaded points as columns of a PLY, or as attribute pages of a container.
 //
 // A container is copied page by page, without decoding, and gets an attribute page for each point
-// page, and more with groups of lights. Its payload holds one column of halves for each component:
+// page, and more with reflections or groups of lights. Its payload holds one column of halves for
+// each component:
 //
 //   copied pages, without meta page    | new attribute pages                    | meta page
 //   point and node pages, old channels | occlusion occlusion ... bent_normal.x bent_normal.x ...
@@ -27,7 +28,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kLightBytes = 3 * 2;  // of a group of lights in a container
+constexpr std::size_t kLightBytes = 3 * 2;  // of a colour in a container
 
 std::size_t floats_of(const ShadedExtras& extras) {
   std::size_t floats = 0;
@@ -39,24 +40,27 @@ std::size_t floats_of(const ShadedExtras& extras) {
 /// albedo / pi times the irradiance.
 class ShadedValues {
  public:
-  ShadedValues(std::span<const Surfel> surfels, std::span<const Shading> shading,
-               std::span<const ErrorEstimate> estimates, std::span<const glm::vec3> groups)
+  ShadedValues(std::span<const Surfel> surfels, const LitReceivers& lit,
+               std::span<const glm::vec3> groups)
       : surfels_(surfels),
-        shading_(shading),
-        estimates_(estimates),
+        lit_(lit),
         groups_(groups),
         group_count_(groups.size() / std::max<std::size_t>(1, surfels.size())) {}
 
   void append(std::size_t i, std::vector<float>& to) const {
-    const Shading& s = shading_[i];
+    const Shading& s = lit_.shading[i];
     to.push_back(s.occlusion);
     for (const glm::vec3& v :
          {s.bent_normal, s.irradiance, s.sky,
           surfels_[i].albedo * (s.irradiance + s.sky) * std::numbers::inv_pi_v<float>})
       to.insert(to.end(), {v.x, v.y, v.z});
-    if (!estimates_.empty()) {
-      to.push_back(estimates_[i].occlusion);
-      to.push_back(estimates_[i].irradiance);
+    if (!lit_.estimates.empty()) {
+      to.push_back(lit_.estimates[i].occlusion);
+      to.push_back(lit_.estimates[i].irradiance);
+    }
+    if (!lit_.reflections.empty()) {
+      const auto& [radiance, occlusion] = lit_.reflections[i];
+      to.insert(to.end(), {radiance.x, radiance.y, radiance.z, occlusion});
     }
     for (std::size_t k = 0; k < group_count_; ++k) {
       const glm::vec3& v = groups_[i * group_count_ + k];
@@ -66,36 +70,36 @@ class ShadedValues {
 
  private:
   std::span<const Surfel> surfels_;
-  std::span<const Shading> shading_;
-  std::span<const ErrorEstimate> estimates_;
+  const LitReceivers& lit_;
   std::span<const glm::vec3> groups_;
   std::size_t group_count_;
 };
 
 /// Returns the record of a container with the channels of its shading, in place of those of an
-/// earlier one. Groups of lights come last, as many in a group of channels as fit.
+/// earlier one. The later channels come last, as many in a group of channels as fit.
 Meta shaded_meta(const ContainerReader& from, const std::string& settings,
                  const ShadedExtras& extras) {
   Meta meta = from.meta();
   std::erase_if(meta.channels,
                 [&](const Channel& c) { return holds_shading(from.meta().channels, c.group); });
   std::vector<Channel> added = shading_channels(extras);
-  const std::vector<Channel> lights(added.end() - static_cast<std::ptrdiff_t>(extras.groups.size()),
-                                    added.end());
-  added.resize(added.size() - lights.size());
+  const auto later_count = static_cast<std::ptrdiff_t>(later_channels(extras));
+  const std::vector<Channel> later(added.end() - later_count, added.end());
+  added.resize(added.size() - later.size());
   meta.channels.insert(meta.channels.begin(), added.begin(), added.end());
   std::size_t left = 0;
-  for (Channel light : lights) {
+  for (Channel channel : later) {
+    const std::size_t bytes = std::size_t{2} * channel.components;
     unsigned group = meta.channels.back().group;
-    if (left < kLightBytes) {
+    if (left < bytes) {
       ++group;
       left = kPointBytes;
     }
-    left -= kLightBytes;
+    left -= bytes;
     if (group > kMaxGroup)
-      throw DataError(from.path().string() + ": its channels leave no room for groups of lights");
-    light.group = static_cast<std::uint8_t>(group);
-    meta.channels.push_back(std::move(light));
+      throw DataError(from.path().string() + ": its channels leave no room for those of shading");
+    channel.group = static_cast<std::uint8_t>(group);
+    meta.channels.push_back(std::move(channel));
   }
   meta.text["shading"] = settings;
   return meta;
@@ -115,13 +119,12 @@ class PointSink : public ShadedSink {
   }
 
   void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
-             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
-             std::span<const glm::vec3> groups) override {
+             const LitReceivers& lit, std::span<const glm::vec3> groups) override {
     const std::size_t row_bytes = rows.size() / surfels.size();
     const std::size_t added = floats_ * sizeof(float);
     joined_.resize(surfels.size() * (row_bytes + added));
     std::byte* to = joined_.data();
-    const ShadedValues values(surfels, shading, estimates, groups);
+    const ShadedValues values(surfels, lit, groups);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
       values_.clear();
       values.append(i, values_);
@@ -140,8 +143,8 @@ class PointSink : public ShadedSink {
   std::vector<std::byte> joined_;  // rows of a block
 };
 
-/// A copy of the receivers' container with an attribute page more for each point page, and one for
-/// each five groups of lights. Channels of an earlier shading are left out.
+/// A copy of the receivers' container with an attribute page more for each point page, and more for
+/// reflections and groups of lights. Channels of an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
   ContainerSink(const std::filesystem::path& target, const ContainerReader& from,
@@ -161,9 +164,8 @@ class ContainerSink : public ShadedSink {
   }
 
   void write(std::span<const Surfel> surfels, std::span<const std::byte> /*rows*/,
-             std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
-             std::span<const glm::vec3> groups) override {
-    const ShadedValues values(surfels, shading, estimates, groups);
+             const LitReceivers& lit, std::span<const glm::vec3> groups) override {
+    const ShadedValues values(surfels, lit, groups);
     for (std::size_t i = 0; i < surfels.size(); ++i) {
       values.append(i, values_);
       if (values_.size() == page_points() * floats_) flush();
@@ -259,11 +261,11 @@ PointWriteInfo shaded_points(const ContainerReader& receivers, std::uint64_t poi
 }
 
 std::uint64_t sink_bytes(const std::filesystem::path& target, const ContainerReader& receivers,
-                         std::size_t groups) noexcept {
+                         std::size_t later) noexcept {
   if (output_format(target)) return 0;
   // There is at most one attribute page of each group of channels for each page
   return ContainerWriter::memory_bytes(
-      (2 + (groups + kPointBytes / kLightBytes - 1) / (kPointBytes / kLightBytes)) *
+      (2 + (later + kPointBytes / kLightBytes - 1) / (kPointBytes / kLightBytes)) *
           std::uint64_t{receivers.page_count()},
       receivers.header().page_shift, 1);
 }

@@ -12,7 +12,7 @@
 
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/point_writer.h"
-#include "engine/pipeline/quality/estimate.h"
+#include "engine/pipeline/quality/check.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/shade/shading.h"
 #include "engine/store/reader.h"
@@ -30,14 +30,12 @@ class ShadedSink {
   /// Appends a block of points.
   /// @param rows       of the receivers' own channels, one row for each surfel; used by files of
   ///                   points
-  /// @param shading    one result for each surfel
-  /// @param estimates  one for each surfel; empty when the sink was made without estimates
+  /// @param lit        one result for each surfel, with what the sink was made for
   /// @param groups     radiance of each surfel in each group of lights, surfel after surfel; empty
   ///                   when the sink was made without groups
   /// @throws std::system_error
   virtual void write(std::span<const Surfel> surfels, std::span<const std::byte> rows,
-                     std::span<const Shading> shading, std::span<const ErrorEstimate> estimates,
-                     std::span<const glm::vec3> groups) = 0;
+                     const LitReceivers& lit, std::span<const glm::vec3> groups) = 0;
   /// Completes and publishes the file. @throws std::system_error
   virtual void finish() = 0;
 };
@@ -75,9 +73,9 @@ void check_shaded_sink(const std::filesystem::path& target, const ContainerReade
 
 /// Returns the bytes of memory that a sink needs for the pages and the directory of a .ptcx; 0 for
 /// a file of points.
-/// @param groups  number of groups of lights
+/// @param later  number of later_channels()
 [[nodiscard]] std::uint64_t sink_bytes(const std::filesystem::path& target,
                                        const ContainerReader& receivers,
-                                       std::size_t groups = 0) noexcept;
+                                       std::size_t later = 0) noexcept;
 
 }  // namespace ptc

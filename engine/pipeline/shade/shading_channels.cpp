@@ -73,16 +73,25 @@ std::vector<Channel> shading_channels(const ShadedExtras& extras) {
     channels.push_back(number("occlusion_error", "1"));
     channels.push_back(number("irradiance_error", "W/m^2"));
   }
+  if (extras.glossy) {
+    channels.push_back(colour("reflection", kRadianceUnit));
+    channels.push_back(number("reflection_occlusion", "1"));
+  }
   for (const std::string& group : extras.groups)
     channels.push_back(colour(group_channel(group), kRadianceUnit));
   return channels;
 }
 
+std::size_t later_channels(const ShadedExtras& extras) noexcept {
+  return (extras.glossy ? 2 : 0) + extras.groups.size();
+}
+
 bool is_shading(const Channel& channel) {
   if (is_group(channel)) return true;
-  return std::ranges::any_of(shading_channels({.estimates = true}), [&](const Channel& added) {
-    return channel.name == added.name && channel.components == added.components;
-  });
+  return std::ranges::any_of(
+      shading_channels({.estimates = true, .glossy = true}), [&](const Channel& added) {
+        return channel.name == added.name && channel.components == added.components;
+      });
 }
 
 bool have_shading(std::span<const Channel> channels) {
@@ -94,7 +103,7 @@ bool have_shading(std::span<const Channel> channels) {
 
 std::vector<Channel> join_shading(std::vector<Channel> channels) {
   std::vector<Channel> joined = channels;
-  const std::vector<Channel> added = shading_channels({.estimates = true});
+  const std::vector<Channel> added = shading_channels({.estimates = true, .glossy = true});
   const auto starts = [&](const Channel& channel) { return channel.name == added[0].name; };
   auto at = static_cast<std::size_t>(std::ranges::find_if(joined, starts) - joined.begin());
   for (const Channel& channel : added) {

@@ -16,6 +16,7 @@ inline constexpr std::uint8_t kShadingGroup = 1;
 /// What a shading adds to a point besides its light.
 struct ShadedExtras {
   bool estimates = false;           ///< estimated errors
+  bool glossy = false;              ///< reflections
   std::vector<std::string> groups;  ///< names of groups of lights; empty: the rest
 };
 
@@ -24,8 +25,12 @@ struct ShadedExtras {
 [[nodiscard]] std::string group_channel(const std::string& group);
 
 /// Returns the channels that shading adds to a point, of type half: those of kShadingGroup, then
-/// one for each group of lights, whose groups of channels the container chooses.
+/// those of later_channels().
 [[nodiscard]] std::vector<Channel> shading_channels(const ShadedExtras& extras);
+
+/// Returns the number of the last shading_channels() whose groups the container chooses: those of
+/// reflections, and one for each group of lights.
+[[nodiscard]] std::size_t later_channels(const ShadedExtras& extras) noexcept;
 
 /// Says whether a channel has the name and the components of one that shading adds.
 [[nodiscard]] bool is_shading(const Channel& channel);

@@ -65,6 +65,12 @@ class DiscRays {
   /// Traces stratified cosine rays from a receiver. The result is deterministic in `seed`.
   /// @param rays  number of rays, best a power of 4
   [[nodiscard]] Shading trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const;
+  /// Finds what rays from a place meet.
+  /// @param position    scene units
+  /// @param directions  unit
+  /// @param hits        as many as directions
+  void meet(const glm::dvec3& position, std::span<const glm::vec3> directions,
+            std::span<DiscHit> hits) const;
 
  private:
   struct Impl;

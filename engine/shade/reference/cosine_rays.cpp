@@ -71,9 +71,8 @@ class Curve {
   unsigned bits_ = 0;
 };
 
-/// Takes a point of the square to the unit disc. Squares about the middle become circles: the
-/// greater coordinate is the radius, which is the sine of the angle to the normal, and their ratio
-/// the place on an eighth of the circle.
+}  // namespace
+
 glm::vec2 concentric(const glm::vec2& point) {
   const float u = 2 * point.x - 1, v = 2 * point.y - 1;
   const bool wide = std::abs(u) > std::abs(v);
@@ -83,32 +82,36 @@ glm::vec2 concentric(const glm::vec2& point) {
   return wide ? glm::vec2(along, across) : glm::vec2(across, along);
 }
 
-}  // namespace
-
-void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,
-                       std::vector<glm::vec3>& directions) {
+void curve_points(std::size_t count, std::uint64_t seed, std::vector<glm::vec2>& points) {
   // Count the points of each cell
-  const SquarePoints points(seed);
+  const SquarePoints sequence(seed);
   const Curve curve(count);
   thread_local std::vector<glm::vec2> square;
   thread_local std::vector<std::uint32_t> begins;
   square.resize(count);
   begins.assign(curve.count() + 1, 0);
   for (std::size_t i = 0; i < count; ++i) {
-    square[i] = points.square(static_cast<std::uint32_t>(i));
+    square[i] = sequence.square(static_cast<std::uint32_t>(i));
     ++begins[curve.of(square[i]) + 1];
   }
   std::partial_sum(begins.begin(), begins.end(), begins.begin());
-  // Put their directions in order
+  // Put them in order
+  points.resize(count);
+  for (const glm::vec2& point : square) points[begins[curve.of(point)]++] = point;
+}
+
+void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,
+                       std::vector<glm::vec3>& directions) {
+  thread_local std::vector<glm::vec2> points;
+  curve_points(count, seed, points);
   const glm::vec3 tangent = glm::normalize(
       glm::cross(normal, std::abs(normal.x) > 0.6F ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0)));
   const glm::vec3 bitangent = glm::cross(normal, tangent);
-  directions.resize(count);
-  for (const glm::vec2& point : square) {
+  directions.clear();
+  for (const glm::vec2& point : points) {
     const glm::vec2 disc = concentric(point);
-    directions[begins[curve.of(point)]++] =
-        tangent * disc.x + bitangent * disc.y +
-        normal * std::sqrt(std::max(0.0F, 1 - glm::dot(disc, disc)));
+    directions.push_back(tangent * disc.x + bitangent * disc.y +
+                         normal * std::sqrt(std::max(0.0F, 1 - glm::dot(disc, disc))));
   }
 }
 

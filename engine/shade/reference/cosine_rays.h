@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
 #include "engine/shade/shading.h"
@@ -24,10 +25,20 @@ struct DiscHit {
   [[nodiscard]] bool met() const noexcept { return depth < std::numeric_limits<float>::infinity(); }
 };
 
-/// Makes cosine-distributed directions above a normal: points of SquarePoints, taken to the disc by
-/// the concentric map of Shirley and Chiu 1997. They are in the order of a Hilbert curve of the
-/// square, so that neighbours in the list have neighbouring directions. The same seed gives the
-/// same directions.
+/// Makes points of SquarePoints in the order of a Hilbert curve of the square, so that neighbours
+/// in the list lie close together. The same seed gives the same points.
+/// @param points  receives them
+void curve_points(std::size_t count, std::uint64_t seed, std::vector<glm::vec2>& points);
+
+/// Takes a point of the unit square to the unit disc, and areas to areas. Squares about the middle
+/// become circles: the greater coordinate is the distance from the centre, and their ratio the
+/// place on an eighth of the circle. Source: Shirley and Chiu 1997, A low distortion map between
+/// disk and square.
+[[nodiscard]] glm::vec2 concentric(const glm::vec2& point);
+
+/// Makes cosine-distributed directions above a normal: curve_points(), whose concentric() places
+/// are those of the directions seen from above. Neighbours in the list have neighbouring
+/// directions.
 /// @param count       number of directions
 /// @param directions  receives them
 void cosine_directions(const glm::vec3& normal, std::size_t count, std::uint64_t seed,

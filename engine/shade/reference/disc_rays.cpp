@@ -172,10 +172,15 @@ DiscRays::~DiscRays() = default;
 Shading DiscRays::trace(const Receiver& receiver, unsigned rays, std::uint64_t seed) const {
   std::vector<glm::vec3> directions;
   cosine_directions(receiver.normal, rays, seed, directions);
-  const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, receiver.position);
   std::vector<DiscHit> hits(directions.size());
-  for (std::size_t i = 0; i < hits.size(); ++i) hits[i] = impl_->meet(from, directions[i]);
+  meet(receiver.position, directions, hits);
   return sum_rays(receiver, directions, hits, impl_->sky);
+}
+
+void DiscRays::meet(const glm::dvec3& position, std::span<const glm::vec3> directions,
+                    std::span<DiscHit> hits) const {
+  const glm::vec3 from = impl_->space.scale.way(impl_->space.origin, position);
+  for (std::size_t i = 0; i < hits.size(); ++i) hits[i] = impl_->meet(from, directions[i]);
 }
 
 }  // namespace ptc
