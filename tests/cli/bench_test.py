@@ -179,6 +179,20 @@ class Bench(ProgramTest):
             self.assertLess(row["rms"], 0.4 if row["light"] == "sun" else 0.3)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["relight.csv", "relight.json", "relight.png", "relight.svg"])
 
+    def test_reflections_are_compared_with_many_more_rays(self):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "glossy", "city", "--quick", "-o", charts)
+        rows = json.loads((charts / "glossy.json").read_text())["rows"]
+        self.assertEqual([(r["roughness"], r["method"], r["rays"]) for r in rows],
+                         [(roughness, method, rays) for roughness in (0.1, 0.3, 0.6, 1.0)
+                          for method in ("ptcx", "embree-discs") for rays in (16, 64, 256)])
+        for row in rows:
+            self.assertLess(row["occlusion"], 0.1)
+            self.assertLess(abs(row["bias"]), 0.1)
+            self.assertGreater(row["noise"], 0)
+        self.assertLess(rows[2]["radiance"], 0.3)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["glossy.csv", "glossy.json", "glossy.png", "glossy.svg"])
+
     def test_points_are_written_and_read_in_every_format(self):
         charts = self.here / "charts"
         cloud = self.here / "more.xyz"

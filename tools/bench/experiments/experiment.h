@@ -45,6 +45,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_demo_experiment();
 [[nodiscard]] Experiment make_error_experiment();
 [[nodiscard]] Experiment make_formats_experiment();
+[[nodiscard]] Experiment make_glossy_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
 [[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_model_experiment();
