@@ -12,7 +12,7 @@ constexpr char kReading[] =
     "rays through the octree of the container; embree-discs casts the same rays one at a time at "
     "the same discs in memory, whose tree takes up to 200 bytes a surfel and is built before. "
     "Receivers are points of the scene, in blocks of neighbours, whose fronts the camera of the "
-    "scene's picture sees. The reference are many more rays by Embree, in two halves: errors are "
+    "scene's picture sees. The reference is many more rays by Embree, in two halves: errors are "
     "free of its noise, and its noise stands beside them. Radiance is over the mean radiance, "
     "occlusion absolute.";
 
