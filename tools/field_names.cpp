@@ -59,6 +59,7 @@ constexpr std::array kFields{
     FieldName{"sampling.pixels_per_surfel", "--pixels-per-surfel"},
     FieldName{"sampling.spacing", "--spacing"},
     FieldName{"selection.every", "--every"},
+    FieldName{"shadows", "--shadow"},
     FieldName{"size", "--size"},
     FieldName{"sky", "--sky"},
     FieldName{"tolerate_damage", "--tolerate-damage"},

@@ -250,6 +250,19 @@ void add_surroundings(CLI::App& app, Surroundings& around) {
       ->group(kGroup);
 }
 
+void add_shadows(CLI::App& app, std::vector<std::string>& shadows, const std::string& where) {
+  app.add_option("--shadow", shadows,
+                 "Also write the shadow of a group of lights; repeatable\n"
+                 "The " +
+                     where +
+                     " shadow_NAME is the share of the light of the group's suns, point and spot "
+                     "lights that something hides, 0 to 1; 1 where the surface is turned away. "
+                     "--light-group names groups, in this run or where the scene was lit.")
+      ->type_name("NAME")
+      ->allow_extra_args(false)
+      ->group("Lights");
+}
+
 void add_glossy(CLI::App& app, GlossyRequest& glossy, const std::string& where) {
   constexpr char kGroup[] = "Reflections";
   app.add_option_function<float>(

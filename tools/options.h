@@ -61,6 +61,10 @@ void add_gather_options(CLI::App& app, GatherOptions& gather, float& lift);
 /// Declares --sphere, --cone, --distance and --falloff.
 void add_surroundings(CLI::App& app, Surroundings& around);
 
+/// Declares --shadow NAME, repeatable.
+/// @param where  what receives the shadow: a channel or a layer
+void add_shadows(CLI::App& app, std::vector<std::string>& shadows, const std::string& where);
+
 /// Declares --glossy ROUGHNESS and --glossy-rays N.
 /// @param where  what receives the reflection: a channel or a layer
 void add_glossy(CLI::App& app, GlossyRequest& glossy, const std::string& where);

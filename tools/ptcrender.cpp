@@ -125,6 +125,7 @@ void declare_lights(CLI::App& app, Arguments& arguments) {
   arguments.lights.declare(app);
   ptc::add_bounces(app, arguments.request.bounces)->group("Lights");
   ptc::add_light_groups(app, arguments.request.light_groups, "a layer");
+  ptc::add_shadows(app, arguments.request.shadows, "layer");
   ptc::add_light_sampling(app, arguments.request.light_sampling);
 }
 

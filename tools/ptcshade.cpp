@@ -83,6 +83,7 @@ int main(int argc, char** argv) {
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(app, preset);
   ptc::add_surroundings(app, request.gather.around);
+  ptc::add_shadows(app, request.shadows, "channel");
   ptc::add_glossy(app, request.glossy, "channel");
   app.add_option_function<std::string>(
          "--eye",

@@ -57,13 +57,14 @@ struct DiscLight::Worker {
   std::vector<std::uint8_t> hidden;    ///< for each ray
   std::uint64_t count = 0;             ///< rays so far
 
-  /// Adds what the rays bring that nothing hides, and forgets them.
-  void bring(std::span<glm::vec3> out) {
+  /// Adds what the rays bring that nothing hides, and what all bring, and forgets them.
+  void bring(std::span<glm::vec3> out, std::span<glm::vec3> open) {
     hidden.resize(rays.size());
     tracer.test(rays, hidden);
     count += rays.size();
     for (std::size_t ray = 0; ray < rays.size(); ++ray) {
       if (hidden[ray] == 0) out[surfels[ray]] += brings[ray];
+      if (!open.empty()) open[surfels[ray]] += brings[ray];
     }
     rays.clear();
     brings.clear();
@@ -99,7 +100,7 @@ std::uint64_t DiscLight::rays() const noexcept {
 
 void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
                             std::span<const float> heights, std::uint64_t first,
-                            std::span<glm::vec3> out) const {
+                            std::span<glm::vec3> out, std::span<glm::vec3> open) const {
   // Trace around the middle of the block
   Bounds bounds;
   for (const Surfel& surfel : surfels) bounds.add(surfel.position);
@@ -112,6 +113,7 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
     for (std::size_t i = from; i < to; ++i) {
       const Surfel& surfel = surfels[i];
       out[i] = glm::vec3(0);
+      if (!open.empty()) open[i] = glm::vec3(0);
       if (!(surfel.radius > 0)) continue;
       const Basis basis(surfel.normal);
       for (unsigned place = 0; place < kPlaces; ++place) {
@@ -132,21 +134,23 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
           own.brings.push_back(ray.irradiance / static_cast<float>(kPlaces));
           own.surfels.push_back(static_cast<std::uint32_t>(i));
         }
-        if (own.rays.size() >= kRays) own.bring(out);
+        if (own.rays.size() >= kRays) own.bring(out, open);
       }
     }
-    own.bring(out);
+    own.bring(out, open);
   }
 }
 
 void DiscLight::irradiance(std::span<const Surfel> surfels, std::span<const float> heights,
-                           std::uint64_t first, std::span<glm::vec3> out) {
+                           std::uint64_t first, std::span<glm::vec3> out,
+                           std::span<glm::vec3> open) {
   const std::size_t blocks = (surfels.size() + kBlock - 1) / kBlock;
   executor_.for_each(blocks, [&](std::size_t block, unsigned thread) {
     if (!workers_[thread]) workers_[thread] = std::make_unique<Worker>(view_, cache_, sides_);
     const std::size_t from = block * kBlock, count = std::min(kBlock, surfels.size() - from);
     light_block(*workers_[thread], surfels.subspan(from, count), heights.subspan(from, count),
-                first + from, out.subspan(from, count));
+                first + from, out.subspan(from, count),
+                open.empty() ? open : open.subspan(from, count));
   });
 }
 

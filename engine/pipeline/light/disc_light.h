@@ -52,9 +52,10 @@ class DiscLight {
   /// @param heights  for each surfel: how far its receivers rise above it, scene units
   /// @param first    number of the first surfel, which with the others fixes the sample points
   /// @param out      for each surfel
+  /// @param open     for each surfel: what would arrive if nothing hid it; may be empty
   /// @throws FormatError when a page is damaged; std::system_error
   void irradiance(std::span<const Surfel> surfels, std::span<const float> heights,
-                  std::uint64_t first, std::span<glm::vec3> out);
+                  std::uint64_t first, std::span<glm::vec3> out, std::span<glm::vec3> open = {});
 
   /// Number of shadow rays so far.
   [[nodiscard]] std::uint64_t rays() const noexcept;
@@ -63,7 +64,7 @@ class DiscLight {
   struct Worker;
 
   void light_block(Worker& worker, std::span<const Surfel> surfels, std::span<const float> heights,
-                   std::uint64_t first, std::span<glm::vec3> out) const;
+                   std::uint64_t first, std::span<glm::vec3> out, std::span<glm::vec3> open) const;
 
   const SceneView& view_;
   PageCache& cache_;

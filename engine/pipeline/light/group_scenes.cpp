@@ -20,6 +20,7 @@ std::vector<std::string> groups_of(const LightingRequest& request, const LightRi
   excludes(request.error.has_value(), "error");
   excludes(request.estimate, "estimate");
   excludes(request.glossy.roughness.has_value(), "glossy.roughness");
+  excludes(!request.shadows.empty(), "shadows");
   excludes(request.check.receivers > 0, "check");
   excludes(request.tolerate_damage, "tolerate_damage");
   std::vector<std::string> groups = light_groups(rig, emits);

@@ -44,11 +44,10 @@ void check_combination(const LightingRequest& request) {
                        "`tolerate_damage` excludes `error` and `check`: their rays read every "
                        "point. Salvage the scene first");
   }
-  if (request.glossy.roughness) {
-    throw RequestError(
-        "tolerate_damage",
-        "`tolerate_damage` excludes `glossy.roughness`: its rays read every point. Salvage the "
-        "scene first");
+  if (request.glossy.roughness || !request.shadows.empty()) {
+    throw RequestError("tolerate_damage",
+                       "`tolerate_damage` excludes `glossy.roughness` and `shadows`: their rays "
+                       "read every point. Salvage the scene first");
   }
 }
 

@@ -70,6 +70,8 @@ struct LightingRequest {
   /// Estimates the error of every receiver, for about twice the time. Needs `error` or `check`.
   bool estimate = false;
   GlossyRequest glossy;
+  /// Groups of lights whose shadows are found, too (spec/shading.md#shadows).
+  std::vector<std::string> shadows;
   float lift = 0.15F;  ///< height of a receiver above its surfel, in radii of the surfel
   BackEnd back_end = BackEnd::pread;  ///< how pages are read
   /// Shades past pages of the scene that break a rule, and reports them. Excludes `error`, `check`

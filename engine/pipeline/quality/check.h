@@ -54,6 +54,8 @@ struct LitReceivers {
   std::span<const Shading> shading;
   std::span<const ErrorEstimate> estimates;  ///< empty when no estimates were asked for
   std::span<const Reflection> reflections;   ///< empty when none were asked for
+  /// Shadows of each receiver in every group that was asked for, receiver after receiver.
+  std::span<const float> shadows;
 };
 
 /// An even sample of a run's receivers with their shading. The same receivers in the same order

@@ -38,11 +38,14 @@ Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
     reflection_.resize(pixels, glm::vec3(0));
     reflection_occlusion_.resize(pixels, 0);
   }
+  for (const std::string& name : extras.shadows)
+    shadows_.emplace_back(name, std::vector<float>(pixels));
 }
 
 std::uint64_t Film::pixel_bytes(const FilmExtras& extras) noexcept {
   return 5 * sizeof(glm::vec3) + (extras.estimates ? 4 : 2) * sizeof(float) +
-         (extras.glossy ? sizeof(glm::vec3) + sizeof(float) : 0);
+         (extras.glossy ? sizeof(glm::vec3) + sizeof(float) : 0) +
+         extras.shadows.size() * sizeof(float);
 }
 
 void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight) {
@@ -66,6 +69,10 @@ void Film::add(std::size_t pixel, const ErrorEstimate& estimate, float weight) {
 void Film::add(std::size_t pixel, const Reflection& reflection, float weight) {
   reflection_[pixel] += weight * reflection.radiance;
   reflection_occlusion_[pixel] += weight * reflection.occlusion;
+}
+
+void Film::add(std::size_t pixel, std::span<const float> shadows, float weight) {
+  for (std::size_t i = 0; i < shadows.size(); ++i) shadows_[i].second[pixel] += weight * shadows[i];
 }
 
 void Film::add_group(const std::string& layer, const Film& group) {
@@ -115,6 +122,7 @@ void Film::write_exr(const std::filesystem::path& target) const {
     layers.push_back({"reflection", Kind::colour, false, flatten(reflection_)});
     layers.push_back({"reflection_occlusion", Kind::scalar, false, reflection_occlusion_});
   }
+  for (const auto& [name, shadow] : shadows_) layers.push_back({name, Kind::scalar, false, shadow});
   for (const auto& [name, light] : groups_)
     layers.push_back({name, Kind::colour, false, flatten(light)});
   ptc::write_exr(target, width_, height_, layers);

@@ -31,8 +31,9 @@ struct PictureTarget {
 
 /// Layers that a picture has only when they are asked for.
 struct FilmExtras {
-  bool estimates = false;  ///< occlusion_error and irradiance_error
-  bool glossy = false;     ///< reflection and reflection_occlusion
+  bool estimates = false;            ///< occlusion_error and irradiance_error
+  bool glossy = false;               ///< reflection and reflection_occlusion
+  std::vector<std::string> shadows;  ///< names of layers of shadows
 };
 
 /// The layers of a picture: weighted means over the samples of every pixel, row 0 at the top.
@@ -61,6 +62,8 @@ class Film {
   /// Adds the reflection of a sample that meets a surface.
   /// @pre the film has reflections
   void add(std::size_t pixel, const Reflection& reflection, float weight);
+  /// Adds the shadows of a sample that meets a surface, one for each layer of shadows.
+  void add(std::size_t pixel, std::span<const float> shadows, float weight);
   /// Adds a sample that meets nothing but the sky.
   /// @param radiance  W / (m^2 sr)
   void add_sky(std::size_t pixel, const glm::vec3& radiance, float weight) {
@@ -92,8 +95,9 @@ class Film {
   std::vector<std::pair<std::string, std::vector<glm::vec3>>> groups_;  ///< layers by name
   /// Mean squares until finish(), root mean squares afterwards; empty without estimates.
   std::vector<float> occlusion_error_, irradiance_error_;
-  std::vector<glm::vec3> reflection_;        ///< empty without reflections
-  std::vector<float> reflection_occlusion_;  ///< empty without reflections
+  std::vector<glm::vec3> reflection_;                                ///< empty without reflections
+  std::vector<std::pair<std::string, std::vector<float>>> shadows_;  ///< layers by name
+  std::vector<float> reflection_occlusion_;                          ///< empty without reflections
 };
 
 }  // namespace ptc

@@ -40,15 +40,16 @@ class MeshView : public PrimaryView {
     // an edge would else lie behind the discs of the other side, which are clear to it, or look
     // through the gap that they leave along the edge
     const glm::dvec3 place = hit->position - glm::dvec3(direction) * double{kStepBack * lift_};
+    const glm::dvec3 geometric(hit->geometric_normal * turn);
     PrimaryHit primary{.position = place,
+                       .surface = hit->position + geometric * scene_.epsilon(),
                        .normal = hit->normal * turn,
                        .lift = lift_,
                        .offset_normal = hit->geometric_normal * turn,
                        .albedo = hit->albedo};
     const std::uint64_t seed = std::uint64_t{y} << 32 | x;
     const DirectLight::Result light =
-        light_.irradiance(hit->position + glm::dvec3(primary.offset_normal) * scene_.epsilon(),
-                          primary.normal, sampling_, seed);
+        light_.irradiance(primary.surface, primary.normal, sampling_, seed);
     primary.direct = primary.albedo * light.local * std::numbers::inv_pi_v<float>;
     if (hit->front) primary.direct += hit->emission;
     return primary;

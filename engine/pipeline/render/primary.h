@@ -24,6 +24,7 @@ namespace ptc {
 /// The place where the ray of a sample meets a surface.
 struct PrimaryHit {
   glm::dvec3 position{0};      ///< scene units
+  glm::dvec3 surface{0};       ///< place on the surface of a mesh, scene units
   glm::vec3 normal{0};         ///< shading normal, unit, turned towards the camera
   float lift = 0;              ///< scene units to rise along `offset_normal` before shading
   glm::vec3 offset_normal{0};  ///< normal of the surface itself, unit, turned towards the camera

@@ -26,6 +26,7 @@
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/light/group_scenes.h"
+#include "engine/pipeline/light/group_shadows.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
@@ -51,6 +52,8 @@ struct Subject {
   Mesh mesh;          ///< empty: the camera sees the surfels
   std::unique_ptr<RayScene> rays;
   std::unique_ptr<DirectLight> light;
+  std::vector<std::unique_ptr<DirectLight>> shadow_lights;  ///< of a mesh, for each group
+  std::unique_ptr<DiscShadows> shadows;  ///< of surfels; null: none are asked for
   bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
   std::unique_ptr<PrimaryView> view;
 
@@ -149,7 +152,9 @@ void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
 }
 
 FilmExtras extras_of(const RenderRequest& request) {
-  return {.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+  FilmExtras extras{.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+  for (const std::string& group : request.shadows) extras.shadows.push_back(shadow_channel(group));
+  return extras;
 }
 
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
@@ -224,8 +229,10 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
 /// over the others.
 class TileRenderer {
  public:
-  TileRenderer(const Subject& subject, const Sky& sky, Lighting& lighting, Film& film)
-      : subject_(subject), sky_(sky), lighting_(lighting), film_(film) {}
+  /// @param sun_rays  shadow rays of a hit for each sun, where shadows are asked for
+  TileRenderer(const Subject& subject, const Sky& sky, unsigned sun_rays, Lighting& lighting,
+               Film& film)
+      : subject_(subject), sky_(sky), sun_rays_(sun_rays), lighting_(lighting), film_(film) {}
 
   void render_all(Progress& progress) {
     const Camera& camera = subject_.camera;
@@ -253,9 +260,30 @@ class TileRenderer {
     for (const auto& hit : hits_) {
       if (hit) receivers_.push_back(receiver_at(*hit));
     }
-    const LitReceivers lit = lighting_.shade(receivers_, sample);
+    LitReceivers lit = lighting_.shade(receivers_, sample);
+    lit.shadows = find_shadows();
     expose(tile, sample, lit);
     progress.advance(hits_.size() - receivers_.size());
+  }
+
+  /// Returns the shadows at the hits, hit after hit.
+  std::span<const float> find_shadows() {
+    if (subject_.shadows) return subject_.shadows->at(receivers_);
+    const auto& lights = subject_.shadow_lights;
+    shadows_.resize(receivers_.size() * lights.size());
+    if (lights.empty()) return shadows_;
+    std::vector<const PrimaryHit*> seen;
+    for (const auto& hit : hits_) {
+      if (hit) seen.push_back(&*hit);
+    }
+    lighting_.executor().for_each(seen.size(), [&](std::size_t i, unsigned) {
+      for (std::size_t group = 0; group < lights.size(); ++group) {
+        shadows_[i * lights.size() + group] =
+            lights[group]->shadow(seen[i]->surface, seen[i]->normal, sun_rays_, seed_ + i);
+      }
+    });
+    seed_ += seen.size();
+    return shadows_;
   }
 
   void find_hits(const Tile& tile, unsigned sample) {
@@ -280,6 +308,8 @@ class TileRenderer {
       const std::size_t pixel = std::size_t{y} * subject_.camera.width + x;
       if (hits_[i]) {
         if (!lit.estimates.empty()) film_.add(pixel, lit.estimates[next], weight);
+        const std::size_t groups = lit.shadows.size() / receivers_.size();
+        film_.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
         if (!lit.reflections.empty()) film_.add(pixel, lit.reflections[next], weight);
         film_.add(pixel, *hits_[i], lit.shading[next++], weight);
       } else {
@@ -293,10 +323,13 @@ class TileRenderer {
 
   const Subject& subject_;
   const Sky& sky_;
+  unsigned sun_rays_;
   Lighting& lighting_;
   Film& film_;
   std::vector<std::optional<PrimaryHit>> hits_;
   std::vector<Receiver> receivers_;
+  std::vector<float> shadows_;
+  std::uint64_t seed_ = 0;  ///< hits whose shadows were found
 };
 
 /// Checks that every picture has a file of its own, which is none that the run reads.
@@ -319,8 +352,8 @@ void check_names(const RenderRequest& request, std::span<const PictureTarget> ta
 }
 
 /// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
-///         when a layer is unknown or not asked for, or when estimates or groups have no .exr to go
-///         to
+///         when a layer is unknown or not asked for, or when estimates, shadows or groups have no
+///         .exr to go to
 void check_targets(const RenderRequest& request, std::span<const PictureTarget> targets) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool exr = false;
@@ -339,6 +372,10 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
           "the layer 'reflection' needs a roughness: ask for `glossy.roughness` as well");
     }
     exr |= ending == ".exr";
+  }
+  if (!request.shadows.empty() && !exr) {
+    throw RequestError("shadows",
+                       "`shadows` adds layers, which only an .exr has: name an .exr as output");
   }
   if (request.light_groups && !exr) {
     throw RequestError("light_groups",
@@ -375,12 +412,25 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   load_subject(subject, request, part, lighting.scene(), progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
+  const std::vector<LightRig> rigs = rigs_of_groups(lights, request.shadows);
 
   // Divide the memory, shade earlier bounces, choose the settings
+  MemoryBudget budget = picture_budget(request, part, subject);
+  if (sees_mesh) {
+    for (const LightRig& rig : rigs)
+      subject.shadow_lights.push_back(std::make_unique<DirectLight>(*subject.rays, rig));
+  } else if (!rigs.empty()) {
+    budget.charge("shadows", DiscShadows::bytes(lighting.scene(), rigs,
+                                                lighting.executor().threads(), request.back_end));
+  }
   const bool by_emitters = sees_mesh ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
-  lighting.prepare(picture_budget(request, part, subject), lights.sky, !by_emitters,
+  lighting.prepare(std::move(budget), lights.sky, !by_emitters,
                    std::min(request.samples, kMaxVariants), subject.camera.position,
                    targets.front().path);
+  if (!sees_mesh && !rigs.empty()) {
+    subject.shadows = std::make_unique<DiscShadows>(lighting.scene(), rigs, request.gather.sides,
+                                                    request.back_end, lighting.executor());
+  }
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
   Film film(subject.camera.width, subject.camera.height, extras_of(request));
   lighting.tune([&] { return pilots_of(subject, lighting.executor()); });
@@ -388,7 +438,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   // Render all samples into the film
   {
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
-    TileRenderer(subject, lights.sky, lighting, film).render_all(progress);
+    TileRenderer(subject, lights.sky, request.light_sampling.sun_rays, lighting, film)
+        .render_all(progress);
   }
   lighting.finish();  // frees the page cache, so that there is room for copies of the layers
   done(film);

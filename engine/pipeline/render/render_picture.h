@@ -52,8 +52,8 @@ struct RenderRequest : LightingRequest {
   /// else the gather brings their light, and no ray is cast at them.
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
   /// Keeps the light of each group of lights apart, in a layer for each of an .exr. The scene is
-  /// lit and rendered once for each; `error`, `estimate`, `glossy`, `check` and `tolerate_damage`
-  /// keep their defaults then.
+  /// lit and rendered once for each; `error`, `estimate`, `glossy`, `shadows`, `check` and
+  /// `tolerate_damage` keep their defaults then.
   bool light_groups = false;
   float exposure = 0;  ///< stops by which a .png of light is brightened
 };
@@ -72,6 +72,8 @@ struct RenderRequest : LightingRequest {
 ///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
 ///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
 ///   reflection_occlusion 1  only with LightingRequest::glossy, 0 to 1
+///   shadow_NAME        1   only with LightingRequest::shadows: share of a group's light that is
+///                          hidden, 0 to 1; 0 where no surface is seen
 ///   light_NAME         3   only with `light_groups`: the beauty that is due to a group; the sum of
 ///                          all is the beauty
 ///

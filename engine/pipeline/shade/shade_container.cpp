@@ -28,6 +28,7 @@
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/light/group_scenes.h"
+#include "engine/pipeline/light/group_shadows.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
@@ -149,7 +150,9 @@ std::string settings_text(const ShadeRequest& request, const GatherOptions& g, u
 }
 
 ShadedExtras extras_of(const ShadeRequest& request) {
-  return {.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+  return {.estimates = request.estimate,
+          .glossy = request.glossy.roughness.has_value(),
+          .shadows = request.shadows};
 }
 
 /// Returns the place from which mirrors are looked at.
@@ -284,7 +287,9 @@ std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
 }
 
 /// Shades all receivers, batch by batch.
-void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, ShadedSink& sink) {
+/// @param shadows  null: none are asked for
+void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, DiscShadows* shadows,
+               ShadedSink& sink) {
   PointCursor cursor = receivers.cursor();
   const Lifting lifting(receivers.container.header().frame, cursor.channels(), lift);
   std::vector<Surfel> surfels(kBatch);
@@ -292,7 +297,8 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, S
   std::vector<std::byte> rows;
   while (const std::size_t count = cursor.next(surfels, &rows)) {
     lifting.place(std::span(surfels).first(count), rows, batch);
-    const LitReceivers lit = lighting.shade(std::span(batch).first(count));
+    LitReceivers lit = lighting.shade(std::span(batch).first(count));
+    if (shadows) lit.shadows = shadows->at(std::span(batch).first(count));
     sink.write(std::span(surfels).first(count), rows, lit, {});
   }
 }
@@ -317,13 +323,19 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   check_count(receivers, target);
   const ShadedExtras extras = extras_of(request);
   check_shaded_sink(target, receivers.container, extras);
-  const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
+  const LightRig recorded = recorded_lights(lighting.scene(), progress);
+  const Sky sky = request.sky ? *request.sky : recorded.sky;
+  const std::vector<LightRig> rigs = rigs_of_groups(recorded, request.shadows);
 
   // Divide the memory, shade earlier bounces, choose the settings
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");
   if (receivers.other) charge_directory(budget, *receivers.other);
   budget.charge("the output's directory",
                 sink_bytes(target, receivers.container, later_channels(extras)));
+  const unsigned threads = lighting.executor().threads();
+  if (!rigs.empty()) {
+    budget.charge("shadows", DiscShadows::bytes(lighting.scene(), rigs, threads, request.back_end));
+  }
   // The light that emitters gave the scene's own points is in their radiance
   const bool emission = receivers.other || !lit_by_emitters(lighting.scene());
   lighting.prepare(std::move(budget), sky, emission, 1, eye_of(request, lighting.scene()), target);
@@ -341,7 +353,12 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
       make_shaded_sink(target, receivers.container, info, extras);
   {
     const Stage stage(report.seconds, progress, "shade", receivers.points, "points");
-    shade_all(receivers, request.lift, lighting, *sink);
+    std::unique_ptr<DiscShadows> shadows;
+    if (!rigs.empty()) {
+      shadows = std::make_unique<DiscShadows>(lighting.scene(), rigs, request.gather.sides,
+                                              request.back_end, lighting.executor());
+    }
+    shade_all(receivers, request.lift, lighting, shadows.get(), *sink);
   }
   lighting.finish();
   sink->finish();

@@ -37,7 +37,8 @@ struct ShadeRequest : LightingRequest {
   /// (PointWriteInfo::colour_from).
   std::string colour_from;
   /// Keeps the light of each group of lights apart, in a channel for each: `count` and `sky` keep
-  /// their defaults then, as do `error`, `estimate`, `glossy`, `check` and `tolerate_damage`.
+  /// their defaults then, as do `error`, `estimate`, `glossy`, `shadows`, `check` and
+  /// `tolerate_damage`.
   bool light_groups = false;
   /// Place from which mirrors are looked at, scene units; empty: that of the camera of a picture of
   /// the scene.
@@ -58,6 +59,8 @@ struct ShadeRequest : LightingRequest {
 ///   irradiance_error   1   estimated error, W / m^2, only with LightingRequest::estimate
 ///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
 ///   reflection_occlusion 1  only with LightingRequest::glossy, 0 to 1
+///   shadow_NAME        1   only with LightingRequest::shadows: share of a group's light that is
+///                          hidden, 0 to 1
 ///   light_NAME         3   only with `light_groups`: all radiance of a point that is due to a
 ///                          group, W / (m^2 sr)
 ///

@@ -1,8 +1,8 @@
 // Shaded points as columns of a PLY, or as attribute pages of a container.
 //
 // A container is copied page by page, without decoding, and gets an attribute page for each point
-// page, and more with reflections or groups of lights. Its payload holds one column of halves for
-// each component:
+// page, and more with reflections, shadows or groups of lights. Its payload holds one column of
+// halves for each component:
 //
 //   copied pages, without meta page    | new attribute pages                    | meta page
 //   point and node pages, old channels | occlusion occlusion ... bent_normal.x bent_normal.x ...
@@ -62,6 +62,9 @@ class ShadedValues {
       const auto& [radiance, occlusion] = lit_.reflections[i];
       to.insert(to.end(), {radiance.x, radiance.y, radiance.z, occlusion});
     }
+    const std::size_t shadows = lit_.shadows.size() / surfels_.size();
+    const auto own = lit_.shadows.subspan(i * shadows, shadows);
+    to.insert(to.end(), own.begin(), own.end());
     for (std::size_t k = 0; k < group_count_; ++k) {
       const glm::vec3& v = groups_[i * group_count_ + k];
       to.insert(to.end(), {v.x, v.y, v.z});
@@ -144,7 +147,7 @@ class PointSink : public ShadedSink {
 };
 
 /// A copy of the receivers' container with an attribute page more for each point page, and more for
-/// reflections and groups of lights. Channels of an earlier shading are left out.
+/// reflections, shadows and groups of lights. Channels of an earlier shading are left out.
 class ContainerSink : public ShadedSink {
  public:
   ContainerSink(const std::filesystem::path& target, const ContainerReader& from,

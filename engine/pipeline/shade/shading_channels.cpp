@@ -14,10 +14,11 @@ namespace {
 
 /// What the names of groups' channels begin with.
 constexpr std::string_view kGroupPrefix = "light_";
+constexpr std::string_view kShadowPrefix = "shadow_";
 constexpr const char* kRadianceUnit = "W/(m^2 sr)";
 
-Channel number(const char* name, const char* unit) {
-  return {.name = name, .unit = unit};
+Channel number(std::string name, const char* unit) {
+  return {.name = std::move(name), .unit = unit};
 }
 
 Channel colour(std::string name, const char* unit) {
@@ -56,10 +57,19 @@ bool is_group(const Channel& channel) {
          channel.role == ChannelRole::colour && channel.unit == kRadianceUnit;
 }
 
+/// Says whether a channel is the shadow of a group.
+bool is_shadow(const Channel& channel) {
+  return channel.name.starts_with(kShadowPrefix) && channel.components == 1 && channel.unit == "1";
+}
+
 }  // namespace
 
 std::string group_channel(const std::string& group) {
   return std::string(kGroupPrefix) + (group.empty() ? kRestGroup : group);
+}
+
+std::string shadow_channel(const std::string& group) {
+  return std::string(kShadowPrefix) + group;
 }
 
 std::vector<Channel> shading_channels(const ShadedExtras& extras) {
@@ -77,17 +87,19 @@ std::vector<Channel> shading_channels(const ShadedExtras& extras) {
     channels.push_back(colour("reflection", kRadianceUnit));
     channels.push_back(number("reflection_occlusion", "1"));
   }
+  for (const std::string& group : extras.shadows)
+    channels.push_back(number(shadow_channel(group), "1"));
   for (const std::string& group : extras.groups)
     channels.push_back(colour(group_channel(group), kRadianceUnit));
   return channels;
 }
 
 std::size_t later_channels(const ShadedExtras& extras) noexcept {
-  return (extras.glossy ? 2 : 0) + extras.groups.size();
+  return (extras.glossy ? 2 : 0) + extras.shadows.size() + extras.groups.size();
 }
 
 bool is_shading(const Channel& channel) {
-  if (is_group(channel)) return true;
+  if (is_group(channel) || is_shadow(channel)) return true;
   return std::ranges::any_of(
       shading_channels({.estimates = true, .glossy = true}), [&](const Channel& added) {
         return channel.name == added.name && channel.components == added.components;
@@ -109,6 +121,9 @@ std::vector<Channel> join_shading(std::vector<Channel> channels) {
   for (const Channel& channel : added) {
     if (join_columns(channel, at, joined)) ++at;
   }
+  while (at < joined.size() && joined[at].name.starts_with(kShadowPrefix) &&
+         join_columns(number(joined[at].name, "1"), at, joined))
+    ++at;
   while (at < joined.size() && joined[at].name.starts_with(kGroupPrefix) &&
          joined[at].name.ends_with("_r")) {
     const std::string name = joined[at].name.substr(0, joined[at].name.size() - 2);

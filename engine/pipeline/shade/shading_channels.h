@@ -15,21 +15,25 @@ inline constexpr std::uint8_t kShadingGroup = 1;
 
 /// What a shading adds to a point besides its light.
 struct ShadedExtras {
-  bool estimates = false;           ///< estimated errors
-  bool glossy = false;              ///< reflections
-  std::vector<std::string> groups;  ///< names of groups of lights; empty: the rest
+  bool estimates = false;            ///< estimated errors
+  bool glossy = false;               ///< reflections
+  std::vector<std::string> shadows;  ///< names of groups of lights whose shadows come along
+  std::vector<std::string> groups;   ///< names of groups of lights; empty: the rest
 };
 
 /// Returns the name of the channel or layer of a group of lights.
 /// @param group  empty: the rest
 [[nodiscard]] std::string group_channel(const std::string& group);
 
+/// Returns the name of the channel or layer of the shadow of a group of lights.
+[[nodiscard]] std::string shadow_channel(const std::string& group);
+
 /// Returns the channels that shading adds to a point, of type half: those of kShadingGroup, then
 /// those of later_channels().
 [[nodiscard]] std::vector<Channel> shading_channels(const ShadedExtras& extras);
 
 /// Returns the number of the last shading_channels() whose groups the container chooses: those of
-/// reflections, and one for each group of lights.
+/// reflections and shadows, and one for each group of lights.
 [[nodiscard]] std::size_t later_channels(const ShadedExtras& extras) noexcept;
 
 /// Says whether a channel has the name and the components of one that shading adds.

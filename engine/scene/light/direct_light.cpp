@@ -52,18 +52,30 @@ DirectLight::DirectLight(const RayScene& scene, LightRig rig)
   sky_is_black_ = !is_lit(sky.radiance) || (sky_density_ && sky_density_->is_black());
 }
 
-glm::vec3 DirectLight::from_lights(const Place& at, const LightSampling& sampling) const {
+std::optional<DirectLight::Place> DirectLight::place_at(const RayScene& scene,
+                                                        const glm::dvec3& position,
+                                                        const glm::vec3& normal,
+                                                        std::uint64_t seed) {
+  const glm::vec3 unit = glm::normalize(normal);
+  if (!is_finite(unit) || !std::isfinite(glm::dot(position, position))) return std::nullopt;
+  const std::optional<glm::dvec3> origin = step_off(scene, position, unit);
+  if (!origin) return std::nullopt;
+  return Place{position, *origin, unit, seed};
+}
+
+DirectLight::Sums DirectLight::from_lights(const Place& at, const LightSampling& sampling) const {
   thread_local std::vector<LightRay> rays;
   rays_.draw(at.position, at.normal, sampling, at.seed, 0, rays);
-  glm::vec3 sum(0);
+  Sums sums;
   for (const LightRay& ray : rays) {
     // End a ray a little before its emitter, as it begins a little off the receiver
     const bool hidden =
         ray.ends ? is_hidden(at, ray.end + 2 * scene_.epsilon() * glm::dvec3(ray.end_normal))
                  : scene_.occluded(at.origin, ray.direction, 0, kFar);
-    if (!hidden) sum += ray.irradiance;
+    sums.open += ray.irradiance;
+    if (!hidden) sums.arrives += ray.irradiance;
   }
-  return sum;
+  return sums;
 }
 
 bool DirectLight::is_hidden(const Place& at, const glm::dvec3& end) const {
@@ -112,18 +124,23 @@ glm::vec3 DirectLight::from_sky(const Place& at, unsigned rays) const {
 DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const glm::vec3& normal,
                                             const LightSampling& sampling,
                                             std::uint64_t seed) const {
-  const glm::vec3 unit = glm::normalize(normal);
-  if (!is_finite(unit) || !std::isfinite(glm::dot(position, position))) return {};
-  const std::optional<glm::dvec3> origin = step_off(scene_, position, unit);
-  if (!origin) return {};
+  const std::optional<Place> at = place_at(scene_, position, normal, seed);
+  if (!at) return {};
   // Add up the lights. A result that overflows counts as black.
-  const Place at{position, *origin, unit, seed};
   Result result;
-  result.local = from_lights(at, sampling);
-  result.sky = from_sky(at, sampling.sky_rays);
+  result.local = from_lights(*at, sampling).arrives;
+  result.sky = from_sky(*at, sampling.sky_rays);
   if (!is_finite(result.local)) result.local = glm::vec3(0);
   if (!is_finite(result.sky)) result.sky = glm::vec3(0);
   return result;
+}
+
+float DirectLight::shadow(const glm::dvec3& position, const glm::vec3& normal, unsigned sun_rays,
+                          std::uint64_t seed) const {
+  const std::optional<Place> at = place_at(scene_, position, normal, seed);
+  if (!at) return 1;
+  const Sums sums = from_lights(*at, {.sun_rays = sun_rays, .area_rays = 0, .sky_rays = 0});
+  return hidden_share(sums.arrives, sums.open);
 }
 
 }  // namespace ptc

@@ -36,12 +36,24 @@ class DirectLight {
   /// @param normal    of any length; a vector without a direction receives no light
   [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
                                   const LightSampling& sampling, std::uint64_t seed) const;
+  /// Estimates the share of the light of suns, point and spot lights that the mesh hides, as
+  /// hidden_share().
+  /// @param position, normal, seed  as for irradiance()
+  [[nodiscard]] float shadow(const glm::dvec3& position, const glm::vec3& normal, unsigned sun_rays,
+                             std::uint64_t seed) const;
   /// Returns the rig with its directions normalised.
   [[nodiscard]] const LightRig& rig() const noexcept { return rays_.rig(); }
 
  private:
   struct Place;
-  [[nodiscard]] glm::vec3 from_lights(const Place& at, const LightSampling& sampling) const;
+  /// Irradiance of lights and emitters, with what is hidden and without.
+  struct Sums {
+    glm::vec3 arrives{0}, open{0};
+  };
+  [[nodiscard]] static std::optional<Place> place_at(const RayScene& scene,
+                                                     const glm::dvec3& position,
+                                                     const glm::vec3& normal, std::uint64_t seed);
+  [[nodiscard]] Sums from_lights(const Place& at, const LightSampling& sampling) const;
   [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
   [[nodiscard]] glm::vec3 along_sky_ray(const Place& at, const glm::vec3& direction,
                                         float cosine_rays, float map_rays, float map_density) const;

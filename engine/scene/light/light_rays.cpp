@@ -98,4 +98,12 @@ void LightRays::draw(const glm::dvec3& position, const glm::vec3& normal,
   }
 }
 
+float hidden_share(const glm::vec3& arrives, const glm::vec3& open) noexcept {
+  const auto luminance = [](const glm::vec3& light) {
+    return 0.2126F * light.r + 0.7152F * light.g + 0.0722F * light.b;
+  };
+  const float all = luminance(open);
+  return all > 0 ? std::clamp(1 - luminance(arrives) / all, 0.0F, 1.0F) : 1.0F;
+}
+
 }  // namespace ptc

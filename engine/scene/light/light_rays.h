@@ -63,6 +63,12 @@ class LightRays {
   double closest_;
 };
 
+/// Returns the share of a light that something hides, by luminance (Rec. 709), 0 to 1; 1 where none
+/// could arrive at all.
+/// @param arrives  irradiance that arrives, W/m^2
+/// @param open     irradiance that would arrive if nothing hid it, W/m^2
+[[nodiscard]] float hidden_share(const glm::vec3& arrives, const glm::vec3& open) noexcept;
+
 /// The kinds of light, each of which takes its own sample points; the numbers of suns follow.
 enum class LightKind : std::uint64_t { sky = 1, sky_map, area, first_sun };
 
