@@ -12,6 +12,7 @@
 #include "engine/io/image/image.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/render/render_picture.h"
 #include "engine/store/reader.h"
 #include "tests/support/scenes.h"
@@ -165,4 +166,23 @@ TEST_CASE("overview: the box before a backdrop is that of the mesh", "[integrati
     CHECK(box.low == bounds.low);
     CHECK(box.high == bounds.high);
   }
+}
+
+TEST_CASE("overview: the camera of a mesh file keeps its horizontal angle in every shape",
+          "[integration]") {
+  const TemporaryDirectory dir;
+  static_cast<void>(overview_of(dir / "cloud.xyz", ellipsoid(glm::dvec3(1)), {0, 1, 0}));
+  const ContainerReader scene(dir / "cloud.xyz.ptcx");
+  const MeshCamera from{.position = {1, 2, 3}, .horizontal_fov = 0.9F};
+  for (const auto& size :
+       {std::array{400U, 300U}, std::array{100U, 300U}, std::array{960U, 540U}}) {
+    const Camera camera = default_camera(scene, {&from, 1}, {}, size);
+    CHECK(camera.width == size[0]);
+    CHECK(camera.height == size[1]);
+    const float wide = std::tan(camera.vertical_fov / 2) * static_cast<float>(size[0]) /
+                       static_cast<float>(size[1]);
+    CHECK(wide == Approx(std::tan(0.45F)));
+  }
+  CHECK(default_camera(scene, {&from, 1}, {}, {}).vertical_fov ==
+        default_camera(scene, {&from, 1}, {}, std::array{960U, 540U}).vertical_fov);
 }

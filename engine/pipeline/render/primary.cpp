@@ -80,6 +80,10 @@ Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> 
     return camera_from_json(recorded->second);
   if (cameras.empty()) return overview(scene, up_of(text), subject, size);
   Camera camera;
+  if (size) {
+    camera.width = (*size)[0];
+    camera.height = (*size)[1];
+  }
   const MeshCamera& from = cameras.front();
   const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
   camera.position = from.position;

@@ -74,7 +74,8 @@ class PrimaryView {
                                                         unsigned side, const Executor& executor);
 
 /// Returns the camera of a request that names none: the one recorded in the container or, without a
-/// record, the first one of the mesh files or, without that, that of overview().
+/// record, the first one of the mesh files or, without that, that of overview(). A camera of a mesh
+/// file keeps its horizontal angle, whatever the shape of the picture.
 /// @param subject  box around what is to fill the picture; empty: the whole scene
 /// @param size     width and height of the picture; empty: those of the camera
 [[nodiscard]] Camera default_camera(const ContainerReader& scene,
