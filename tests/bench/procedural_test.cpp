@@ -114,6 +114,31 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
   }
 }
 
+TEST_CASE("Cornell box: both lamps shine into a valid room, which has two sides with a box",
+          "[bench][procedural]") {
+  for (const CornellLamp lamp : {CornellLamp::flat, CornellLamp::box}) {
+    const Mesh mesh = make_cornell(lamp).mesh;
+    check_sound(mesh);
+    CHECK(std::ranges::count(mesh.material_of, 3) == (lamp == CornellLamp::flat ? 2 : 12));
+    CHECK(mesh.emits());
+    for (const Material& material : mesh.materials)
+      CHECK(material.double_sided == (lamp == CornellLamp::box));
+    // From the middle, rays meet fronts alone, and the lamp above
+    const RayScene scene(mesh);
+    const SquarePoints points(5);
+    for (std::uint32_t i = 0; i < 200; ++i) {
+      const glm::vec2 at = points.square(i);
+      const glm::vec3 along = glm::normalize(glm::vec3(2 * at.x - 1, 2 * at.y - 1, -0.5F));
+      const auto hit = scene.closest({1, 1.5, 1}, along, 0, kFar);
+      REQUIRE(hit);
+      REQUIRE(hit->front);
+    }
+    const auto above = scene.closest({1, 1.5, 1}, {0, 1, 0}, 0, kFar);
+    REQUIRE(above);
+    CHECK(above->emission.x > 0);
+  }
+}
+
 TEST_CASE("layers: half of a sheet's tiles are missing, the rest face up or down",
           "[bench][scene]") {
   for (const unsigned layers : {0U, 1U, 16U}) {

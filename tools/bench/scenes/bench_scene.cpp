@@ -51,6 +51,15 @@ std::string plain_name(const std::filesystem::path& file) {
   return name;
 }
 
+/// Makes the scene of a word other than city, or of layers.
+LitScene procedural_scene(const SceneChoice& choice, std::uint64_t points) {
+  if (choice.layers > 0) return make_layers(choice.layers);
+  if (choice.name == "fractal") return make_fractal(points);
+  if (choice.name == "cornell") return make_cornell(CornellLamp::flat);
+  if (choice.name == "box-lamp") return make_cornell(CornellLamp::box);
+  return make_window_room();
+}
+
 using Hits = std::vector<std::optional<PrimaryHit>>;
 
 /// A receiver for each pixel that sees something, and the window in the middle of the pixels.
@@ -93,7 +102,7 @@ SceneChoice parse_scene(const std::string& text) {
     throw RequestError("scenes",
                        "'" + text + "': names no scene. Give fractal, window, city or a file");
   choice.name = rest;
-  if (rest == "fractal" || rest == "window" || rest == "city") {
+  if (std::ranges::find(kSceneWords, rest) != kSceneWords.end()) {
     if (choice.backdrop)
       throw RequestError("scenes", text + ": only the file of a mesh can stand before a backdrop");
     return choice;
@@ -126,12 +135,11 @@ SceneRequest request_scene(const SceneChoice& choice, const SceneOptions& option
   scene.build.page_shift = options.page_shift;
   if (!choice.file.empty()) {
     scene.build.inputs.push_back(choice.file);
+    scene.build.inputs.insert(scene.build.inputs.end(), choice.more.begin(), choice.more.end());
   } else if (choice.name == "city") {
     scene.build.city_points = options.points;
   } else {
-    scene.lit = choice.layers > 0          ? make_layers(choice.layers)
-                : choice.name == "fractal" ? make_fractal(options.points)
-                                           : make_window_room();
+    scene.lit = procedural_scene(choice, options.points);
     scene.build.lights = scene.lit.lights;
     scene.build.mesh = std::make_shared<const Mesh>(scene.lit.mesh);
   }

@@ -18,13 +18,16 @@
 
 namespace ptc::bench {
 
-/// The choice of a scene: one of the words "fractal", "window" and "city", or the file of a mesh or
-/// a cloud.
+/// The words that name scenes without a file.
+inline constexpr std::array kSceneWords{"fractal", "window", "city", "cornell", "box-lamp"};
+
+/// The choice of a scene: one of kSceneWords, or the file of a mesh or a cloud.
 struct SceneChoice {
   std::string name;  ///< name in charts and files: the word, or the file's name without ending
-  std::filesystem::path file;  ///< empty where the scene is a word
-  bool backdrop = false;       ///< the mesh stands on a ground before a wall
-  unsigned layers = 0;         ///< above 0: make_layers() of this many sheets
+  std::filesystem::path file;                 ///< empty where the scene is a word
+  std::vector<std::filesystem::path> more{};  ///< further files of the same scene
+  bool backdrop = false;                      ///< the mesh stands on a ground before a wall
+  unsigned layers = 0;                        ///< above 0: make_layers() of this many sheets
 };
 
 /// Parses the choice of one scene.

@@ -1,4 +1,4 @@
-// Three meshes that are made from formulas and fixed seeds, so that they are equal on every
+// Four meshes that are made from formulas and fixed seeds, so that they are equal on every
 // machine.
 //
 // fractal: octaves of value noise, each twice as fine and half as high as the one before, give the
@@ -14,6 +14,8 @@
 //         | cupboard            |
 //         +---------------------+
 //                green
+//
+// cornell: walls without thickness around two blocks that stand straight, and a lamp.
 //
 // layers: sheets of tiles over the ground, half of the tiles missing at random.
 #include "tools/bench/scenes/procedural.h"
@@ -152,6 +154,15 @@ void add_box(Mesh& mesh, const glm::vec3& low, const glm::vec3& high, std::uint1
   }
 }
 
+/// Adds a parallelogram whose front is where u turns to v counter-clockwise.
+void add_quad(Mesh& mesh, const glm::vec3& corner, const glm::vec3& u, const glm::vec3& v,
+              std::uint16_t material) {
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  mesh.positions.insert(mesh.positions.end(), {corner, corner + u, corner + u + v, corner + v});
+  add_triangle(mesh, first, first + 1, first + 2, material);
+  add_triangle(mesh, first, first + 2, first + 3, material);
+}
+
 }  // namespace
 
 LitScene make_fractal(std::uint64_t triangles) {
@@ -225,6 +236,38 @@ LitScene make_window_room() {
                   .vertical_fov = 1.0F,
                   .width = 640,
                   .height = 360};
+  return scene;
+}
+
+LitScene make_cornell(CornellLamp lamp) {
+  // Name the materials
+  LitScene scene;
+  Mesh& mesh = scene.mesh;
+  mesh.materials = {{.name = "white", .albedo = glm::vec3(0.75F)},
+                    {.name = "red", .albedo = {0.6F, 0.05F, 0.05F}},
+                    {.name = "green", .albedo = {0.1F, 0.5F, 0.1F}},
+                    {.name = "lamp", .albedo = glm::vec3(0.5F), .emission = glm::vec3(17, 12, 4)}};
+  for (Material& material : mesh.materials) material.double_sided = lamp == CornellLamp::box;
+  // Add floor, ceiling and walls, which face inwards
+  const glm::vec3 x(2, 0, 0), y(0, 2, 0), z(0, 0, 2);
+  add_quad(mesh, {0, 0, 0}, z, x, 0);
+  add_quad(mesh, {0, 2, 0}, x, z, 0);
+  add_quad(mesh, {0, 0, 0}, x, y, 0);
+  add_quad(mesh, {0, 0, 0}, y, z, 1);
+  add_quad(mesh, {2, 0, 0}, z, y, 2);
+  // Add the blocks and the lamp
+  add_box(mesh, {0.4F, 0, 0.4F}, {0.9F, 1.1F, 0.9F}, 0);
+  add_box(mesh, {1.1F, 0, 1}, {1.6F, 0.5F, 1.5F}, 0);
+  if (lamp == CornellLamp::flat) {
+    add_quad(mesh, {0.75F, 1.99F, 0.8F}, {0.5F, 0, 0}, {0, 0, 0.4F}, 3);
+  } else {
+    add_box(mesh, {0.7F, 1.9F, 0.7F}, {1.3F, 1.94F, 1.3F}, 3);
+  }
+  scene.camera = {.position = {1, 1, 5.2},
+                  .look_at = {1, 1, 0},
+                  .vertical_fov = 0.6F,
+                  .width = 640,
+                  .height = 480};
   return scene;
 }
 

@@ -26,6 +26,17 @@ struct LitScene {
 /// +y is up, and the unit is a metre.
 [[nodiscard]] LitScene make_window_room();
 
+/// The lamp of make_cornell().
+enum class CornellLamp {
+  flat,  ///< a rectangle that shines downwards, just below the ceiling
+  box,   ///< a box that shines to all sides and hangs below the ceiling
+};
+
+/// Makes a box of 2 x 2 x 2 units, open towards +z, with a red and a green wall, two blocks and a
+/// lamp. +y is up. With a flat lamp surfaces have one side; with a box all materials are
+/// double-sided, and light goes to and fro between the lamp's top and the ceiling.
+[[nodiscard]] LitScene make_cornell(CornellLamp lamp);
+
 /// Makes ground under sheets of tiles. Half of the tiles are missing at random, so the number of
 /// surfaces behind a surface grows with the number of sheets (depth complexity):
 ///
