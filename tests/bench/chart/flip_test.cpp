@@ -161,3 +161,34 @@ TEST_CASE("flip: different sizes, empty pictures and impossible pixels per degre
     CHECK_THROWS_AS(flip(image, image, eyes), std::invalid_argument);
   }
 }
+
+TEST_CASE("hdr flip: equal pictures have an error of exactly 0, even black ones", "[chart][flip]") {
+  const Image image = noise(40, 30, 3);
+  for (const float error : hdr_flip(image, image)) REQUIRE(error == 0);
+  for (const float error : hdr_flip(plain({}), plain({}))) REQUIRE(error == 0);
+}
+
+TEST_CASE("hdr flip: twice the light in both pictures changes nothing", "[chart][flip]") {
+  const auto scaled = [](Image image, float factor) {
+    for (glm::vec3& pixel : image.pixels) pixel *= factor;
+    return image;
+  };
+  const Image a = noise(40, 30, 3), b = noise(40, 30, 4);
+  CHECK(mean_of(hdr_flip(scaled(a, 1024), scaled(b, 1024))) ==
+        Approx(mean_of(hdr_flip(a, b))).epsilon(1e-3));
+}
+
+TEST_CASE("hdr flip: what is brighter or darker than a screen shows still counts",
+          "[chart][flip]") {
+  // A lamp of 100 beside a wall of 1: an error of either is seen at one of the exposures
+  Image reference = plain(glm::vec3(1), 40, 30);
+  for (std::size_t i = 0; i < 400; ++i) reference.pixels[i] = glm::vec3(100);
+  Image lamp = reference, wall = reference;
+  for (std::size_t i = 0; i < 400; ++i) lamp.pixels[i] = glm::vec3(50);
+  for (std::size_t i = 400; i < 1200; ++i) wall.pixels[i] = glm::vec3(0.5F);
+  CHECK(mean_flip(lamp, reference) == 0);
+  CHECK(hdr_flip(lamp, reference).front() > 0.1F);
+  CHECK(hdr_flip(wall, reference).back() > 0.1F);
+  CHECK(hdr_flip(wall, reference).front() < 0.1F);
+  CHECK_THROWS_AS(hdr_flip(lamp, plain(glm::vec3(1), 30, 40)), std::invalid_argument);
+}

@@ -6,6 +6,8 @@
 //                       `-> Y -> edges and points (first, second derivative) --> feature error f
 //
 //   difference of a pixel = c^(1 - f): colours count more where an edge or a point differs, too
+//
+// HDR-FLIP is the greatest such difference over several exposures (Andersson et al. 2021).
 #include "tools/bench/chart/flip.h"
 
 #include <algorithm>
@@ -175,6 +177,51 @@ Seen see(const Image& image, double pixels_per_degree) {
   return {std::move(colours), features_of(std::move(planes[0]), pixels_per_degree)};
 }
 
+// The tone mapper (a x^2 + b x) / (c x^2 + d x + e), of light that is 1 where a picture is white.
+struct ToneCurve {
+  float a = 0.6F * 0.6F * 2.51F, b = 0.6F * 0.03F;
+  float c = 0.6F * 0.6F * 2.43F, d = 0.6F * 0.59F, e = 0.14F;
+
+  [[nodiscard]] float at(float x) const { return (a * x * x + b * x) / (c * x * x + d * x + e); }
+  // The light that is shown as y: the root of (a - c y) x^2 + (b - d y) x - e y = 0.
+  [[nodiscard]] float light_of(float y) const {
+    const float p = a - c * y, q = b - d * y, r = -e * y;
+    return (-q + std::sqrt(q * q - 4 * p * r)) / (2 * p);
+  }
+};
+constexpr float kShown = 0.85F;  // t: how bright the first and the last exposure show their pixels
+
+float luminance(const glm::vec3& rgb) {
+  return 0.2126F * rgb.x + 0.7152F * rgb.y + 0.0722F * rgb.z;
+}
+
+// The first and the last exposure in stops. A median of 0 gives way to the smallest light above it.
+std::pair<float, float> exposures_of(const Image& reference) {
+  std::vector<float> light;
+  for (const glm::vec3& pixel : reference.pixels) {
+    const float y = luminance(pixel);
+    light.push_back(std::isfinite(y) ? std::max(y, 0.0F) : 0.0F);
+  }
+  std::ranges::sort(light);
+  const float most = light.back();
+  if (most <= 0) return {0, 0};
+  const float median = light[light.size() / 2];
+  const float middle = median > 0 ? median : *std::ranges::upper_bound(light, 0.0F);
+  const float shown = ToneCurve().light_of(kShown);
+  return {std::log2(shown / most), std::log2(shown / middle)};
+}
+
+Image tone_mapped(Image image, float stops) {
+  const float scale = std::exp2(stops);
+  for (glm::vec3& pixel : image.pixels) {
+    for (int c = 0; c < 3; ++c) {
+      const float light = pixel[c] > 0 ? std::min(pixel[c] * scale, 1e9F) : 0.0F;
+      pixel[c] = ToneCurve().at(light);
+    }
+  }
+  return image;
+}
+
 }  // namespace
 
 std::vector<float> flip(const Image& test, const Image& reference, float pixels_per_degree) {
@@ -192,11 +239,29 @@ std::vector<float> flip(const Image& test, const Image& reference, float pixels_
   return errors;
 }
 
-double mean_flip(const Image& test, const Image& reference, float pixels_per_degree) {
+std::vector<float> hdr_flip(const Image& test, const Image& reference, float pixels_per_degree) {
+  check(test, reference, pixels_per_degree);
+  const auto [first, last] = exposures_of(reference);
+  const auto count = static_cast<unsigned>(std::max(2.0F, std::ceil(last - first)));
+  std::vector<float> most(test.pixels.size());
+  for (unsigned i = 0; i < count; ++i) {
+    const float stops =
+        first + (last - first) * static_cast<float>(i) / static_cast<float>(count - 1);
+    const std::vector<float> errors =
+        flip(tone_mapped(test, stops), tone_mapped(reference, stops), pixels_per_degree);
+    for (std::size_t k = 0; k < most.size(); ++k) most[k] = std::max(most[k], errors[k]);
+  }
+  return most;
+}
+
+double mean_of(const std::vector<float>& errors) {
   double sum = 0;
-  const std::vector<float> errors = flip(test, reference, pixels_per_degree);
   for (const float error : errors) sum += static_cast<double>(error);
-  return sum / static_cast<double>(errors.size());
+  return errors.empty() ? 0 : sum / static_cast<double>(errors.size());
+}
+
+double mean_flip(const Image& test, const Image& reference, float pixels_per_degree) {
+  return mean_of(flip(test, reference, pixels_per_degree));
 }
 
 }  // namespace ptc

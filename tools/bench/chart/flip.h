@@ -25,6 +25,22 @@ inline constexpr float kPixelsPerDegree = 67;
 [[nodiscard]] std::vector<float> flip(const Image& test, const Image& reference,
                                       float pixels_per_degree = kPixelsPerDegree);
 
+/// Computes HDR-FLIP: the greatest flip() of each pixel over the exposures at which a person may
+/// look, from one that shows the brightest pixel of the reference to one that shows its median
+/// pixel. Both pictures are tone-mapped at each of them.
+///
+/// The exposures are about a stop apart. Twice the light in both pictures gives the same result.
+/// @return       differences as flip() does; 0 everywhere where the reference is black
+/// @throws std::invalid_argument as flip() does
+/// Source: Andersson, Nilsson, Shirley and Akenine-Moller 2021, "Visualizing Errors in Rendered
+/// High
+///         Dynamic Range Images"; the tone mapper is the fit of Narkowicz 2016 to ACES.
+[[nodiscard]] std::vector<float> hdr_flip(const Image& test, const Image& reference,
+                                          float pixels_per_degree = kPixelsPerDegree);
+
+/// The mean of the values of flip() or hdr_flip().
+[[nodiscard]] double mean_of(const std::vector<float>& errors);
+
 /// The mean of flip() over the picture.
 [[nodiscard]] double mean_flip(const Image& test, const Image& reference,
                                float pixels_per_degree = kPixelsPerDegree);
