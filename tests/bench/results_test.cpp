@@ -126,6 +126,18 @@ TEST_CASE("results: the file and its charts are written whole, even over an olde
   CHECK(files == 3);
 }
 
+TEST_CASE("results: pictures are written beside the text, which shows them", "[bench][results]") {
+  const test::TemporaryDirectory dir;
+  Report seen = report(5);
+  seen.sheets = {{.part = "room", .caption = "A room.", .image = {2, 1, {{1, 0, 0}, {0, 1, 0}}}}};
+  write_results(dir.path(), seen, circumstances(false));
+  CHECK_THAT(text_of(dir / "sample.md"),
+             Catch::Contains("\nA room.\n\n![A room.](sample-room.png)\n"));
+  const Image image = read_image(dir / "sample-room.png");
+  REQUIRE(image.width == 2);
+  CHECK(image.pixels == seen.sheets[0].image.pixels);
+}
+
 TEST_CASE("results: a part of the report without values is left out", "[bench][results]") {
   Report empty = report(5);
   empty.tables.push_back(

@@ -52,6 +52,8 @@ void write_figures(const std::filesystem::path& directory, const Report& report)
     for (const char* ending : {".svg", ".png"})
       write_chart(directory / (file_name(report, figure.part) + ending), figure.chart);
   }
+  for (const Sheet& sheet : report.sheets)
+    write_png(directory / (file_name(report, sheet.part) + ".png"), sheet.image);
 }
 
 void write_files(const std::filesystem::path& directory, const Report& report) {

@@ -3,6 +3,7 @@
 //
 //   Report -> NAME.json, NAME.csv, NAME-TABLE.csv    facts, for programs (write_files())
 //          -> NAME-PART.svg, NAME-PART.png           charts (write_figures())
+//          -> NAME-PART.png                          pictures (write_figures())
 //          -> NAME.md                                everything, for people (write_results())
 #pragma once
 
@@ -12,6 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "engine/io/image/image.h"
 #include "tools/bench/chart/chart.h"
 #include "tools/bench/report/table.h"
 
@@ -23,6 +25,13 @@ struct Figure {
   Chart chart;
 };
 
+/// A picture that belongs to a report, written as it is.
+struct Sheet {
+  std::string part;     ///< PART of NAME-PART.png
+  std::string caption;  ///< a sentence that says what it shows; a line
+  Image image;          ///< linear RGB, white at 1
+};
+
 /// What one command of ptcbench gives.
 struct Report {
   std::string name;                  ///< NAME of its files, without ending
@@ -32,6 +41,7 @@ struct Report {
   std::vector<Table> tables;         ///< one or more
   std::vector<std::string> notes{};  ///< sentences about these numbers, one paragraph each
   std::vector<Figure> figures{};
+  std::vector<Sheet> sheets{};
 };
 
 /// Finds the series of this name in a panel, or adds it.
@@ -52,7 +62,8 @@ void write_text(const std::filesystem::path& path, const std::string& text);
 /// All tables and notes as text for a terminal.
 [[nodiscard]] std::string text_of(const Report& report);
 
-/// Writes the charts as NAME-PART.svg and NAME-PART.png; charts without panels are left out.
+/// Writes the charts as NAME-PART.svg and NAME-PART.png, and the pictures as NAME-PART.png; charts
+/// without panels are left out.
 /// @throws std::system_error, std::invalid_argument as write_chart()
 void write_figures(const std::filesystem::path& directory, const Report& report);
 

@@ -34,13 +34,17 @@ std::string head_of(const Report& report, const Circumstances& c) {
              report.runs > 0 ? std::to_string(report.runs) : "1, of counts that do not vary");
 }
 
-/// Each chart as a picture in SVG that links to the PNG.
+/// Each chart as a picture in SVG that links to the PNG, then the pictures.
 std::string links_of(const Report& report) {
   std::string text;
   for (const Figure& figure : report.figures) {
     if (figure.chart.panels.empty()) continue;
     const std::string file = file_name(report, figure.part);
     text += fmt::format("\n[![{}]({}.svg)]({}.png)\n", figure.chart.title, file, file);
+  }
+  for (const Sheet& sheet : report.sheets) {
+    text += fmt::format("\n{}\n\n![{}]({}.png)\n", sheet.caption, sheet.caption,
+                        file_name(report, sheet.part));
   }
   return text;
 }

@@ -14,11 +14,11 @@ namespace ptc::bench {
 inline constexpr unsigned kEnoughRuns = 5;
 
 /// The Markdown of a report: title, how to read it, reservations, machine and command, tables,
-/// notes, and links to the charts.
+/// notes, links to the charts, and pictures.
 [[nodiscard]] std::string results_text(const Report& report, const Circumstances& circumstances);
 
-/// Writes NAME.md, and the charts into the same directory. Each file is replaced whole or not at
-/// all.
+/// Writes NAME.md, and the charts and pictures into the same directory. Each file is replaced whole
+/// or not at all.
 /// @throws std::system_error, std::invalid_argument as write_chart()
 void write_results(const std::filesystem::path& directory, const Report& report,
                    const Circumstances& circumstances);
