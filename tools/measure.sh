@@ -93,6 +93,7 @@ measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- 
 measure mutations mutations -- --every 10007
 measure relight relight fractal window city "$mesh+backdrop" -- fractal --points 4k --checked 50 "${once[@]}"
 measure remote remote -- --points 20k
+measure rooms rooms -- --points 5k --paths 32
 measure scale scale --points 2M --points 6M --points 20M --memory 1G -- --points 20k --points 40k --receivers 100 "${once[@]}"
 measure scale-1700m scale --points 20M --points 200M --points 1700M --repeats 1 --memory 2G -- \
   --points 20k --receivers 100 "${once[@]}"

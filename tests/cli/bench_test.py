@@ -193,6 +193,35 @@ class Bench(ProgramTest):
         self.assertLess(rows[2]["radiance"], 0.3)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["glossy.csv", "glossy.json", "glossy.png", "glossy.svg"])
 
+    def test_pictures_of_rooms_are_compared_with_paths(self):
+        charts, pictures = self.here / "charts", self.here / "pictures"
+        self.succeed("ptcbench", "rooms", "cornell", "box-lamp", "--quick", "--pictures", pictures, "-o", charts)
+        rows = json.loads((charts / "rooms.json").read_text())["rows"]
+        self.assertEqual([r["scene"] for r in rows], ["cornell", "box-lamp"])
+        for row in rows:
+            self.assertLess(abs(row["bias"]), 0.1)
+            self.assertGreater(row["judged"], 0.5)
+            self.assertGreater(row["noise_hdr_flip"], 0)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()),
+                         ["rooms-box-lamp.png", "rooms-cornell.png", "rooms.csv", "rooms.json"])
+        self.assertEqual(sorted(p.name for p in pictures.iterdir()), ["box-lamp.exr", "cornell.exr"])
+
+    def test_files_are_joined_to_one_room(self):
+        charts = self.here / "charts"
+        ground = self.here / "ground.obj"
+        ground.write_text("v -9 -1 9\nv 9 -1 9\nv 0 -1 -9\nf 1 2 3\n")
+        self.succeed("ptcbench", "rooms", self.mesh, ground, "--join", "--quick", "--points", "2k", "--paths", "32",
+                     "--sun", "30,60", "--camera", "3,2,5,0,0,0", "--size", "32x24", "-o", charts)
+        rows = json.loads((charts / "rooms.json").read_text())["rows"]
+        alone = self.here / "alone"
+        self.succeed("ptcbench", "rooms", self.mesh, "--quick", "--points", "2k", "--paths", "32", "--size", "32x24",
+                     "-o", alone)
+        single = json.loads((alone / "rooms.json").read_text())["rows"]
+        self.assertEqual([r["scene"] for r in rows], ["box"])
+        self.assertEqual(rows[0]["triangles"], single[0]["triangles"] + 1)
+        self.assertIn("only files can be joined", self.fail_with(2, "ptcbench", "rooms", "cornell", ground, "--join",
+                                                                 "-o", charts))
+
     def test_points_are_written_and_read_in_every_format(self):
         charts = self.here / "charts"
         cloud = self.here / "more.xyz"
@@ -212,7 +241,7 @@ class Bench(ProgramTest):
     def test_scans_are_not_drawn_from_a_cloud(self):
         cloud = self.here / "cloud.xyz"
         cloud.write_text("".join(f"{x} {y} 0\n" for x in range(9) for y in range(9)))
-        for experiment in ("scan", "specks"):
+        for experiment in ("rooms", "scan", "specks"):
             message = self.fail_with(1, "ptcbench", experiment, cloud, "--points", "1k", "-o", self.here / "charts")
             self.assertIn("cloud.xyz: has no triangles", message)
 

@@ -43,6 +43,9 @@ constexpr char kExamples[] =
     "charts\n"
     "  # Compare what the nodes may hold\n"
     "  ptcbench model fractal window dragon.ply.gz+backdrop -o charts\n"
+    "  # Compare pictures of rooms with path tracing, of scenes without files and of a file\n"
+    "  ptcbench rooms -o charts\n"
+    "  ptcbench rooms room.glb --size 320x240 --paths 4096 --pictures pictures -o charts\n"
     "  # Measure sort and build next to the disk\n"
     "  ptcbench build --points 1M --points 20M --points 200M --memory 1G --temp /scratch -o "
     "charts\n"
@@ -143,8 +146,8 @@ int main(int argc, char** argv) {
         make_demo_experiment, make_error_experiment, make_formats_experiment,
         make_glossy_experiment, make_growth_experiment, make_instructions_experiment,
         make_model_experiment, make_mutations_experiment, make_relight_experiment,
-        make_remote_experiment, make_scale_experiment, make_scan_experiment, make_sort_experiment,
-        make_specks_experiment, make_verify_experiment}) {
+        make_remote_experiment, make_rooms_experiment, make_scale_experiment, make_scan_experiment,
+        make_sort_experiment, make_specks_experiment, make_verify_experiment}) {
     const Experiment experiment = make();
     CLI::App* const app = command.app().add_subcommand(experiment.name, experiment.purpose);
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));

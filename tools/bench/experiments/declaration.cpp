@@ -25,7 +25,8 @@ CLI::Validator one_of(const std::vector<std::string>& known) {
 }
 
 /// The scenes that can be named, for the help and for errors.
-constexpr char kScenes[] = "fractal, window, city, or files of meshes and clouds";
+constexpr char kScenes[] =
+    "fractal, window, city, cornell, box-lamp, or files of meshes and clouds";
 
 }  // namespace
 
@@ -49,19 +50,33 @@ GatherOptions parse_setting(const std::string& text) {
 void SceneList::check() {
   choices_ = parse_scenes(texts_);
   for (const SceneChoice& scene : choices_) {
-    if (scene.file.empty()) continue;
+    if (scene.file.empty()) {
+      if (joined_)
+        throw RequestError("scenes", scene.name + ": only files can be joined to one scene");
+      continue;
+    }
     if (!std::filesystem::exists(scene.file)) {
       throw DataError(scene.file.string() + ": No such file or directory; scenes are " + kScenes);
     }
     check_input(scene.file);
   }
+  if (!joined_) return;
+  // Keep the first scene, and give it the files of the others
+  for (std::size_t i = 1; i < choices_.size(); ++i)
+    choices_.front().more.push_back(choices_[i].file);
+  choices_.resize(1);
 }
 
 void SceneList::check_meshes() {
   check();
   for (const SceneChoice& scene : choices_) {
-    if (!scene.file.empty() && holds_points(scene.file))
-      throw DataError(scene.file.string() + ": has no triangles from which points could be drawn");
+    if (scene.file.empty()) continue;
+    std::vector<std::filesystem::path> files = scene.more;
+    files.push_back(scene.file);
+    for (const std::filesystem::path& file : files) {
+      if (holds_points(file))
+        throw DataError(file.string() + ": has no triangles from which points could be drawn");
+    }
   }
 }
 
@@ -74,9 +89,15 @@ void Declaration::scenes(SceneList& scenes) {
       ->add_option("scenes", scenes.texts_,
                    std::string(kScenes) +
                        "; +backdrop after a mesh's name sets it on a ground before a wall "
-                       "[default: fractal window city, fractal with --quick]")
+                       "[default: " +
+                       join(scenes.texts_, " ") + "; " + scenes.texts_.front() + " with --quick]")
       ->type_name("SCENE");
   quick("scenes", scenes.texts_, {scenes.texts_.front()});
+}
+
+void Declaration::joinable(SceneList& scenes) {
+  command_->add_flag_callback(
+      "--join", [&scenes] { scenes.join(); }, "Take all files as one scene, as ptcbuild does");
 }
 
 void Declaration::count(const char* name, std::uint64_t& value, const char* description,

@@ -26,12 +26,18 @@ namespace ptc::bench {
 /// The scenes that an experiment goes through.
 class SceneList {
  public:
+  SceneList() = default;
+  /// @param texts  the default scenes
+  explicit SceneList(std::vector<std::string> texts) : texts_(std::move(texts)) {}
+
   /// Parses the list and checks that its files can be read.
   /// @throws DataError for a file that cannot be read; RequestError as parse_scenes()
   void check();
   /// As check(), for an experiment that draws points from meshes.
   /// @throws DataError for a cloud, too
   void check_meshes();
+  /// Makes check() take all files as one scene.
+  void join() noexcept { joined_ = true; }
   /// The scenes in the order of the command line. @pre check() was called
   [[nodiscard]] const std::vector<SceneChoice>& choices() const noexcept { return choices_; }
 
@@ -39,6 +45,7 @@ class SceneList {
   friend class Declaration;
   std::vector<std::string> texts_{"fractal", "window", "city"};
   std::vector<SceneChoice> choices_;
+  bool joined_ = false;
 };
 
 /// Declares the options of one command. The variables that options set must outlive the parsing.
@@ -66,6 +73,8 @@ class Declaration {
   /// Declares the scenes as positional arguments; with --quick the default is the first scene
   /// alone.
   void scenes(SceneList& scenes);
+  /// Declares --join, which makes one scene of several files.
+  void joinable(SceneList& scenes);
   /// Declares --points of a scene.
   /// @param shown  the default as the help shows it
   /// @param less   the value of --quick

@@ -52,6 +52,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_mutations_experiment();
 [[nodiscard]] Experiment make_relight_experiment();
 [[nodiscard]] Experiment make_remote_experiment();
+[[nodiscard]] Experiment make_rooms_experiment();
 [[nodiscard]] Experiment make_scale_experiment();
 [[nodiscard]] Experiment make_scan_experiment();
 [[nodiscard]] Experiment make_sort_experiment();
