@@ -1,6 +1,7 @@
 #include "engine/trace/decoded_tree.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "engine/trace/decode_kernels.h"
 #include "format/point_page.h"
@@ -17,9 +18,9 @@ static_assert(kGroupPlaces * (sizeof(TraceGroup) + 8) + kLeafPlaces * (sizeof(Tr
 
 }  // namespace
 
-DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, Sides sides, float rim)
+DecodedTree::DecodedTree(const SceneView& view, PageCache& cache, float backs, float rim)
     : scene_(view, cache),
-      rules_{.lengths = view.scale().length_factors(), .sides = sides, .rim = rim},
+      rules_{.lengths = view.scale().length_factors(), .clear_backs = backs, .rim = rim},
       groups_(kGroupPlaces),
       leaves_(kLeafPlaces) {}
 
@@ -37,6 +38,10 @@ glm::dvec3 DecodedTree::place(const glm::dvec3& position) const {
 
 void DecodedTree::decode_group(std::uint64_t reference, TraceGroup& into) {
   const ChildRef ref = decode_reference(reference, true);
+  if (ref.page != view().root().page && scene_.is_lost(view().node_page(ref.page))) {
+    into = {};
+    return;
+  }
   const PinnedGroup found = scene_.group(ref.page, ref.slot);
   decode_boxes(*found, rules_, into);
 }
@@ -45,11 +50,18 @@ void DecodedTree::decode_leaf(std::uint64_t first, std::uint32_t count, TraceLea
   // Append the points of each page that holds some of the run.
   const std::uint32_t per_page = view().points_per_page();
   into.size = count;
+  bool anchored = false;
   for (std::uint32_t done = 0; done < count;) {
     const auto at = static_cast<std::uint32_t>((first + done) % per_page);
     const std::uint32_t number = std::min(count - done, per_page - at);
+    if (scene_.is_lost(view().point_page(first + done))) {
+      for (std::uint32_t i = done; i < done + number; ++i)
+        into.discs[i / kTraceLanes].radius2[i % kTraceLanes] = -1;
+      done += number;
+      continue;
+    }
     const PageGuard page = scene_.points(first + done);
-    if (done == 0) {
+    if (!std::exchange(anchored, true)) {
       const PointPage points(page.payload(), page.record_count(), view().point_bytes());
       const LatticePoint anchor = points.position(at);
       for (int k = 0; k < 3; ++k)

@@ -12,7 +12,9 @@
 namespace ptc {
 
 /// Decodes groups and leaves when they are first asked for, and keeps what was decoded last. What
-/// lies far from a ray's beginning is met from many places, so it is seldom decoded anew.
+/// lies far from a ray's beginning is met from many places, so it is seldom decoded anew. Where the
+/// view passes over damaged pages, rays meet nothing of what needs one; only a damaged page of the
+/// root is an error then.
 ///
 /// Threads: one for each thread.   Memory: kBytes.
 class DecodedTree {
@@ -21,9 +23,9 @@ class DecodedTree {
   static constexpr std::uint64_t kBytes = std::uint64_t{5} << 18;
 
   /// @param view, cache  must outlive this; of the same container
-  /// @param sides        which sides of discs stop rays
+  /// @param backs        as TraceRules::clear_backs
   /// @param rim          radius of discs over their own, 1 or kRim
-  DecodedTree(const SceneView& view, PageCache& cache, Sides sides, float rim);
+  DecodedTree(const SceneView& view, PageCache& cache, float backs, float rim);
 
   /// Returns a place in lattice units, within what floats can square.
   /// @param position  scene units
@@ -47,6 +49,9 @@ class DecodedTree {
   /// @param emission  whether what the point emits is part of it
   /// @throws FormatError when the page is damaged
   [[nodiscard]] glm::vec3 outgoing(std::uint64_t point, bool emission);
+  /// Pins the page that holds a point. Nothing may be decoded while it is pinned.
+  /// @throws FormatError when the page is damaged
+  [[nodiscard]] PageGuard page_of(std::uint64_t point) { return scene_.points(point); }
 
   [[nodiscard]] const SceneView& view() const noexcept { return scene_.view(); }
   [[nodiscard]] const TraceRules& rules() const noexcept { return rules_; }

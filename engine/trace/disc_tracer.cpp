@@ -8,7 +8,7 @@
 namespace ptc {
 
 DiscTracer::DiscTracer(const SceneView& view, PageCache& cache, Sides sides)
-    : tree_(view, cache, sides, 1) {}
+    : tree_(view, cache, clear_backs(sides), 1) {}
 
 bool DiscTracer::is_empty(const ChildRef& leaf) {
   for (std::uint32_t done = 0; done < leaf.point_count; done += kTraceDiscs) {

@@ -88,69 +88,18 @@ std::optional<Shaft> shaft_around(std::span<const ShadowRay> rays,
 }  // namespace
 
 ShadowTracer::ShadowTracer(const SceneView& view, PageCache& cache, Sides sides)
-    : tree_(view, cache, sides, kRim) {}
-
-void ShadowTracer::list_from_root() {
-  words_.clear();
-  items_.clear();
-  const ChildRef& root = tree_.view().root();
-  list_.size = 0;
-  if (!root.interior) return;
-  // One box that holds everything
-  ListedBox all;
-  all.reference = root.page | std::uint64_t{root.slot} << 32;
-  all.interior = true;
-  constexpr float kFar = 0x1p100F;
-  for (std::size_t k = 0; k < 3; ++k) {
-    all.columns[kLowX + k] = -kFar;
-    all.columns[kHighX + k] = kFar;
-  }
-  all.columns[kSlabX] = 1;
-  all.columns[kSlabLow] = -kFar;
-  all.columns[kSlabHigh] = kFar;
-  items_.push_back(all);
-  make_list(items_, list_, words_);
-}
-
-void ShadowTracer::list_along(const Shaft& shaft) {
-  items_.clear();
-  opened_.clear();
-  const ChildRef& root = tree_.view().root();
-  if (root.interior) opened_.push_back(root.page | std::uint64_t{root.slot} << 32);
-  WalkLimit limit(tree_.view());
-  const float width = std::max({shaft.high[0] - shaft.low[0], shaft.high[1] - shaft.low[1]});
-  // Open what is larger than the beam is wide, breadth first, while the list has room
-  alignas(64) float near[kTraceLanes];
-  for (std::size_t next = 0; next < opened_.size(); ++next) {
-    limit.take_group();
-    const TraceGroup& group = tree_.group(opened_[next]);
-    const Beginning from(place_, group.anchor);
-    const unsigned met = meet_shaft(group, from, shaft, near);
-    for (std::size_t i = 0; i < kTraceLanes; ++i) {
-      if ((met >> i & 1) == 0) continue;
-      ListedBox item(group, i, from);
-      const std::size_t planned = items_.size() + (opened_.size() - next) * kTraceLanes;
-      if (item.interior && item.extent() > width && planned < BoxList::kCapacity - kTraceLanes) {
-        opened_.push_back(item.reference);
-        continue;
-      }
-      item.distance = near[i];
-      items_.push_back(item);
-    }
-  }
-  make_list(items_, list_, words_);
-}
+    : tree_(view, cache, clear_backs(sides), kRim) {}
 
 void ShadowTracer::trace_beam(std::span<const ShadowRay> rays, std::span<const std::uint32_t> beam,
                               std::span<std::uint8_t> hidden) {
   const std::optional<Shaft> shaft =
       beam.size() > kFewRays ? shaft_around(rays, beam) : std::nullopt;
   if (shaft) {
-    list_along(*shaft);
+    list_.list_along(tree_, place_, *shaft, 0);
   } else {
-    list_from_root();
+    list_.list_root(tree_);
   }
-  trace_shadows(tree_, place_, list_, words_, rays, beam, hidden);
+  trace_shadows(tree_, place_, list_.boxes(), list_.words(), rays, beam, hidden);
 }
 
 void ShadowTracer::test(std::span<const ShadowRay> rays, std::span<std::uint8_t> hidden) {

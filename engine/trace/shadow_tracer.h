@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/trace/decoded_tree.h"
+#include "engine/trace/shaft_list.h"
 #include "engine/trace/trace_kernels.h"
 
 namespace ptc {
@@ -49,17 +50,12 @@ class ShadowTracer {
  private:
   void trace_beam(std::span<const ShadowRay> rays, std::span<const std::uint32_t> beam,
                   std::span<std::uint8_t> hidden);
-  void list_from_root();
-  void list_along(const Shaft& shaft);
 
   DecodedTree tree_;
   glm::dvec3 place_{0};               ///< around which rays begin, lattice units
   std::vector<std::uint32_t> order_;  ///< indices of rays, by direction
   std::vector<std::uint32_t> keys_;   ///< of the rays, which order them
-  std::vector<ListedBox> items_;
-  std::vector<std::uint64_t> opened_;  ///< references of groups to look at
-  std::vector<std::uint64_t> words_;   ///< references of the list's boxes
-  BoxList list_;
+  ShaftList list_;
 };
 
 }  // namespace ptc

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -36,9 +37,16 @@ inline constexpr float kRim = 1.2F;
 /// What a tree is decoded for.
 struct TraceRules {
   SceneScale::Factors lengths{1, 1};  ///< convert lengths from scene units to edges
-  Sides sides = Sides::both;          ///< which sides of discs stop rays
-  float rim = 1;                      ///< radius of discs over their own, 1 or kRim
+  /// Radii of a disc within which its back is clear to rays that begin there: from clear_backs(), 0
+  /// for rays of a camera, which see the backs of all discs.
+  float clear_backs = 2;
+  float rim = 1;  ///< radius of discs over their own, 1 or kRim
 };
+
+/// Returns TraceRules::clear_backs for rays of receivers.
+[[nodiscard]] inline float clear_backs(Sides sides) noexcept {
+  return sides == Sides::both ? 2 : std::numeric_limits<float>::infinity();
+}
 
 /// Share of a length that rounding may take from it where lengths are added up in floats.
 inline constexpr float kTraceRounding = 4e-7F;

@@ -105,8 +105,8 @@ struct MetDiscs {
   MF met;
 };
 
-/// Tests a vector of discs of a leaf. Backs within two of their own radii of where the ray begins
-/// are clear; with Sides::front all backs are.
+/// Tests a vector of discs of a leaf. Backs within TraceRules::clear_backs of their own radii of
+/// where the ray begins are clear.
 /// @param at   number of the first disc
 /// @param far  depth beyond which discs do not count
 HWY_INLINE MetDiscs meet_discs(const TraceLeaf& leaf, unsigned at, const Beginning& from,
@@ -127,11 +127,9 @@ HWY_INLINE MetDiscs meet_discs(const TraceLeaf& leaf, unsigned at, const Beginni
   const auto depth = hn::MulAdd(load(discs.bump), off2, t);
   auto met = hn::And(hn::Le(off2, radius2), hn::Gt(t, hn::Zero(f)));
   met = hn::And(met, hn::Le(depth, hn::Set(f, far)));
-  auto clear = hn::Ge(height, hn::Zero(f));
-  if (rules.sides == Sides::both) {
-    const auto reach2 = hn::Mul(hn::Set(f, 4 / (rules.rim * rules.rim)), radius2);
-    clear = hn::And(clear, hn::Lt(dot(to, to), reach2));
-  }
+  const float reach = rules.clear_backs / rules.rim;
+  const auto clear = hn::And(hn::Ge(height, hn::Zero(f)),
+                             hn::Lt(dot(to, to), hn::Mul(hn::Set(f, reach * reach), radius2)));
   return {depth, height, hn::And(hn::AndNot(clear, met), hn::FirstN(f, leaf.size - at))};
 }
 
@@ -276,9 +274,8 @@ bool has_disc(const TraceLeaf& leaf, const Beginning& from, const glm::vec3& axi
                  hn::Sub(load(discs.z), hn::Set(f, from.at[2]))};
     const Vec normal{load(discs.nx), load(discs.ny), load(discs.nz)};
     const auto radius2 = load(discs.radius2);
-    auto clear = hn::Ge(dot(to, normal), hn::Zero(f));
-    if (rules.sides == Sides::both)
-      clear = hn::And(clear, hn::Lt(dot(to, to), hn::Mul(hn::Set(f, 4.0F), radius2)));
+    const auto reach2 = hn::Mul(hn::Set(f, rules.clear_backs * rules.clear_backs), radius2);
+    const auto clear = hn::And(hn::Ge(dot(to, normal), hn::Zero(f)), hn::Lt(dot(to, to), reach2));
     // The highest point of a disc is as far above its centre as it is tilted
     const auto cosine = dot(normal, up);
     const Vec tilt{hn::NegMulAdd(cosine, up.x, normal.x), hn::NegMulAdd(cosine, up.y, normal.y),

@@ -2,6 +2,7 @@
 // because no two of them run at once:
 //
 //   prepare()   bounces before the last   a cache for each, one after another
+//   (caller)    the view of a picture     a cache
 //   tune()      rays, gathers, rays       a cache for each, one after another
 //   shade()     Shader, Estimator         one cache for both
 //               or rays                   a cache

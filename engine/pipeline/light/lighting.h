@@ -151,6 +151,12 @@ class Lighting {
   /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots);
 
+  /// The memory of the page cache, bytes, which is free for other uses between two phases.
+  /// @pre prepare()
+  [[nodiscard]] std::uint64_t cache_bytes() const noexcept { return options_.cache_bytes; }
+  /// How pages are read.
+  [[nodiscard]] BackEnd back_end() const noexcept { return request_.back_end; }
+
   /// The settings of the gather that shade() uses, unless it traces rays.
   [[nodiscard]] const GatherOptions& gather() const noexcept { return options_.gather; }
   /// The number of rays by which shade() shades a receiver; 0: by the gather.

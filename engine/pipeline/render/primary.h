@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 #include "engine/base/progress.h"
 #include "engine/base/stream.h"
 #include "engine/base/surfel.h"
+#include "engine/cache/page_source.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -55,20 +57,32 @@ class PrimaryView {
                                                      const Camera& camera, unsigned side,
                                                      float lift);
 
-/// Makes a view of the surfels themselves, drawn as discs into a depth buffer: for clouds without a
-/// mesh. PrimaryHit::direct is their baked radiance.
-/// @param side  samples along the side of a pixel
-/// @param lift  height of receivers above their surfel, in radii of the surfel
-/// @param lost  gets the damaged pages, whose points are not seen; null: damaged pages are errors
-/// @throws FormatError when a page is damaged and `lost` is null; std::system_error
-/// Memory: 24 bytes for each sample.
+/// What a view of the surfels of a container may use.
+struct SurfelViewOptions {
+  unsigned side = 1;  ///< samples along the side of a pixel
+  float lift = 0;     ///< height of receivers above their surfel, in radii of the surfel
+  /// Gets the damaged pages, whose points are not seen; it must outlive the making of the view.
+  /// Null: damaged pages are errors.
+  LostPages* lost = nullptr;
+  /// Cap of the page cache and of what threads decode. Raised to what these need at least.
+  std::uint64_t memory_bytes = std::uint64_t{64} << 20;
+  BackEnd back_end = BackEnd::pread;
+};
+
+/// Makes a view of the surfels themselves by rays at their discs: for clouds without a mesh.
+/// PrimaryHit::direct is their baked radiance.
+/// @param progress  advances by one for each sample
+/// @throws FormatError when a page is damaged and `lost` is null, or that of the octree's root;
+///         std::system_error
+/// Memory: 24 bytes for each sample; while it is made, SurfelViewOptions::memory_bytes.
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene,
-                                                        const Camera& camera, unsigned side,
-                                                        float lift, LostPages* lost,
+                                                        const Camera& camera,
+                                                        const SurfelViewOptions& options,
                                                         const Executor& executor,
                                                         Progress& progress);
 
-/// Makes a view of other surfels in the frame of a scene, such as clusters of its octree.
+/// Makes a view of other surfels in the frame of a scene, such as clusters of its octree, drawn as
+/// discs into a depth buffer of 24 bytes a sample.
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene,
                                                         PointSource& surfels, const Camera& camera,
                                                         unsigned side, const Executor& executor);

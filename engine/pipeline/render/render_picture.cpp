@@ -142,13 +142,19 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
                 lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
 }
 
-/// Makes a view of the scene's surfels, drawn into a depth buffer.
+/// Makes a view of the scene's surfels.
 void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
                       LightingReport& report, Progress& progress) {
   const ContainerReader& scene = lighting.scene();
-  const Stage stage(report.seconds, progress, "splat", scene.superblock().points, "points");
-  subject.view = view_surfels(scene, subject.camera, subject.side, lift, lighting.lost(),
+  const Stage stage(report.seconds, progress, "view", subject.samples(), "samples");
+  subject.view = view_surfels(scene, subject.camera,
+                              {.side = subject.side,
+                               .lift = lift,
+                               .lost = lighting.lost(),
+                               .memory_bytes = lighting.cache_bytes(),
+                               .back_end = lighting.back_end()},
                               lighting.executor(), progress);
+  return_freed_memory();
 }
 
 FilmExtras extras_of(const RenderRequest& request) {

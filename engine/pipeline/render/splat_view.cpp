@@ -1,42 +1,23 @@
-// Primary visibility without a mesh: a perspective depth buffer of discs (primary.h).
+// Draws discs into a depth buffer (splat_view.h).
 //
-// A surfel is a disc with centre c, unit normal n and radius r in the axes of the camera. Its image
-// is an ellipse: span() finds the extent of the ellipse along an axis, cover() tests every sample
-// within. The ray of a sample is k = (x, y, 1), and it meets the plane of the disc at t k:
-//
-//    eye *----------------------- z
-//          `  .         / disc
-//               `  .   /
-//                    `*  t = (c . n) / (k . n), a hit when |t k - c| < r
-//                    /   `  .
-//                              k
-//
-// 64 pages are drawn at a time: pages are projected in parallel, then bands of 16 rows of samples
-// are drawn in parallel, each in the order of the points. A sample belongs to one band, so the
-// picture does not depend on the number of threads.
+// The image of a disc is an ellipse: span() finds the extent of the ellipse along an axis, cover()
+// tests every sample within. Bands of 16 rows of samples are drawn in parallel, each in the order
+// of the points. A sample belongs to one band, so the picture does not depend on the number of
+// threads.
+#include "engine/pipeline/render/splat_view.h"
+
 #include <algorithm>
 #include <cmath>
-#include <span>
-#include <vector>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 
-#include "engine/io/cloud/record.h"
-#include "engine/pipeline/build/point_marks.h"
-#include "engine/pipeline/render/primary.h"
-#include "engine/pipeline/render/splat_holes.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
-#include "engine/shade/scene_scale.h"
-#include "engine/store/attribute_rows.h"
-#include "engine/store/point_scan.h"
 #include "format/scalar.h"
 
 namespace ptc {
 namespace {
 
-constexpr std::size_t kPagesAtOnce = 64;
 constexpr unsigned kBandRows = 16;  // rows of samples that one thread draws
 
 /// A disc in front of the camera, in the camera's axes: x to the right, y down, z forward. Lengths
@@ -48,95 +29,23 @@ struct Projected {
   SplatPayload payload;
 };
 
-/// A view by a depth buffer.
-class SurfelView : public PrimaryView {
+/// A view of the surfels of a source.
+class DrawnView : public SplatView {
  public:
-  SurfelView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift)
-      : position_(camera.position),
-        frame_(scene.header().frame),
-        scale_(frame_),
-        width_(camera.width * side),
-        height_(camera.height * side),
-        lift_(lift),
-        sky_included_(!sky_is_gathered(scene)),
-        samples_(std::size_t{width_} * height_) {
-    const CameraAxes axes = axes_of(camera);
-    axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
-    focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
-  }
-
-  /// Draws the points of all pages of the scene.
-  void draw(const ContainerReader& scene, LostPages* lost, const Executor& executor,
-            Progress& progress) {
-    const PageNumbers::Range pages = scene.point_pages();
-    const std::vector<std::uint8_t> groups = rise_groups(scene.meta().channels);
-    for (std::size_t first = 0; first < pages.size(); first += kPagesAtOnce) {
-      const auto some = pages.subrange(first, std::min(kPagesAtOnce, pages.size() - first));
-      std::vector<std::vector<Projected>> discs(some.size());
-      executor.for_each(some.size(), [&](std::size_t i, unsigned) {
-        PointScan scan(scene, some.subrange(i, 1), noted_in(lost));
-        scan.next();
-        progress.advance(scan.count());
-        if (!scan.whole()) return;
-        AttributeRows attributes(scene, groups);
-        const RisePlace rise(attributes.channels());
-        const std::byte* row = attributes.read(first + i, scan.count()).data();
-        const PointPage points = scan.points();
-        for (std::uint32_t k = 0; k < points.size(); ++k, row += attributes.row_bytes())
-          project(to_surfel(points[k], frame_), rise.radii(row), discs[i]);
-      });
-      draw(discs, executor);
-    }
-  }
+  using SplatView::SplatView;
 
   /// Draws the surfels of a source.
   void draw(PointSource& source, const Executor& executor) {
     std::vector<Surfel> block(1 << 14);
     while (const std::size_t count = source.next(block)) {
       std::vector<std::vector<Projected>> discs(1);
-      for (std::size_t i = 0; i < count; ++i) project(block[i], 0, discs[0]);
+      for (std::size_t i = 0; i < count; ++i) project(block[i], discs[0]);
       draw(discs, executor);
     }
-  }
-
-  /// Closes the holes between the discs. To be called once, when all are drawn.
-  void finish(const Executor& executor) {
-    close_holes(
-        {.samples = samples_, .width = width_, .height = height_, .focal = focal_, .scale = scale_},
-        executor);
-  }
-
-  [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override {
-    const SplatSample& s = samples_[std::size_t{y} * width_ + x];
-    if (s.empty()) return std::nullopt;
-    const glm::vec3 along = axes_ * ray(x, y);
-    const std::array<float, 3> n = decode_octahedral(s.payload.normal[0], s.payload.normal[1]);
-    const std::array<float, 3> radiance = decode_rgbe(s.payload.radiance);
-    glm::vec3 normal(n[0], n[1], n[2]);
-    const bool back = glm::dot(normal, along) > 0;
-    if (back) normal = -normal;
-    const double depth = scale_.scene_units(static_cast<double>(s.depth));
-    PrimaryHit hit{.position = position_ + glm::dvec3(along) * depth,
-                   .normal = normal,
-                   .lift = lift_height(decode_ufloat16(s.payload.radius),
-                                       std::max(lift_, 0.125F * s.payload.rise), frame_),
-                   .offset_normal = normal,
-                   .sky_included = sky_included_ && !back};
-    for (int c = 0; c < 3; ++c) {
-      hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
-    }
-    // The radiance is that of the front; a back has only what is gathered at it
-    if (!back) hit.direct = glm::vec3(radiance[0], radiance[1], radiance[2]);
-    return hit;
+    finish(executor);
   }
 
  private:
-  /// Returns the ray of a sample in the camera's axes, with z = 1.
-  [[nodiscard]] glm::vec3 ray(unsigned x, unsigned y) const {
-    return {(static_cast<float>(x) + 0.5F - 0.5F * static_cast<float>(width_)) / focal_,
-            (static_cast<float>(y) + 0.5F - 0.5F * static_cast<float>(height_)) / focal_, 1};
-  }
-
   /// Draws discs, band by band of rows in parallel. The result depends on the order of the discs
   /// alone.
   void draw(const std::vector<std::vector<Projected>>& discs, const Executor& executor) {
@@ -153,28 +62,17 @@ class SurfelView : public PrimaryView {
   }
 
   /// Appends the disc of a surfel, if the picture may show it.
-  /// @param rise  radii by which a receiver on it must rise
-  void project(const Surfel& surfel, float rise, std::vector<Projected>& discs) const {
-    const glm::vec3 light = surfel.outgoing();
+  void project(const Surfel& surfel, std::vector<Projected>& discs) const {
     Projected disc{
         .centre = scale_.way(position_, surfel.position) * axes_,  // v * M is transpose(M) * v
         .normal = surfel.normal * axes_,
         .radius = scale_.radius(surfel.radius),
-        .payload = {
-            .radiance = encode_rgbe({light.r, light.g, light.b}),
-            .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
-            .radius = encode_ufloat16(surfel.radius),
-            .albedo = {},
-            .rise = static_cast<std::uint8_t>(8 * rise)}};
+        .payload = payload_of(surfel, 0)};
     if (!(disc.radius > 0) || disc.centre.z + disc.radius <= 0) return;
     span(disc, 0, width_, disc.x0, disc.x1);
     span(disc, 1, height_, disc.y0, disc.y1);
     if (disc.x0 >= disc.x1 || disc.y0 >= disc.y1) return;
     disc.payload.back = glm::dot(disc.normal, disc.centre) > 0;
-    for (int c = 0; c < 3; ++c) {
-      disc.payload.albedo[static_cast<std::size_t>(c)] =
-          static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
-    }
     discs.push_back(disc);
   }
 
@@ -222,35 +120,74 @@ class SurfelView : public PrimaryView {
       }
     }
   }
-
-  glm::dvec3 position_;
-  Frame frame_;
-  SceneScale scale_;
-  glm::mat3 axes_{1};  // columns: right, down, forward
-  unsigned width_, height_;
-  float lift_;
-  bool sky_included_;  // in the radiance of the surfels
-  float focal_ = 1;    // in samples
-  std::vector<SplatSample> samples_;
 };
 
 }  // namespace
 
-std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
-                                          unsigned side, float lift, LostPages* lost,
-                                          const Executor& executor, Progress& progress) {
-  auto view = std::make_unique<SurfelView>(scene, camera, side, lift);
-  view->draw(scene, lost, executor, progress);
-  view->finish(executor);
-  return view;
+SplatView::SplatView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift)
+    : position_(camera.position),
+      frame_(scene.header().frame),
+      scale_(frame_),
+      width_(camera.width * side),
+      height_(camera.height * side),
+      lift_(lift),
+      sky_included_(!sky_is_gathered(scene)),
+      samples_(std::size_t{width_} * height_) {
+  const CameraAxes axes = axes_of(camera);
+  axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
+  focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
+}
+
+void SplatView::finish(const Executor& executor) {
+  close_holes(
+      {.samples = samples_, .width = width_, .height = height_, .focal = focal_, .scale = scale_},
+      executor);
+}
+
+std::optional<PrimaryHit> SplatView::at(unsigned x, unsigned y) const {
+  const SplatSample& s = samples_[std::size_t{y} * width_ + x];
+  if (s.empty()) return std::nullopt;
+  const glm::vec3 along = axes_ * ray(x, y);
+  const std::array<float, 3> n = decode_octahedral(s.payload.normal[0], s.payload.normal[1]);
+  const std::array<float, 3> radiance = decode_rgbe(s.payload.radiance);
+  glm::vec3 normal(n[0], n[1], n[2]);
+  const bool back = glm::dot(normal, along) > 0;
+  if (back) normal = -normal;
+  const double depth = scale_.scene_units(static_cast<double>(s.depth));
+  PrimaryHit hit{.position = position_ + glm::dvec3(along) * depth,
+                 .normal = normal,
+                 .lift = lift_height(decode_ufloat16(s.payload.radius),
+                                     std::max(lift_, 0.125F * s.payload.rise), frame_),
+                 .offset_normal = normal,
+                 .sky_included = sky_included_ && !back};
+  for (int c = 0; c < 3; ++c) {
+    hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
+  }
+  // The radiance is that of the front; a back has only what is gathered at it
+  if (!back) hit.direct = glm::vec3(radiance[0], radiance[1], radiance[2]);
+  return hit;
+}
+
+SplatPayload SplatView::payload_of(const Surfel& surfel, float rise) {
+  const glm::vec3 light = surfel.outgoing();
+  SplatPayload payload{
+      .radiance = encode_rgbe({light.r, light.g, light.b}),
+      .normal = encode_octahedral({surfel.normal.x, surfel.normal.y, surfel.normal.z}),
+      .radius = encode_ufloat16(surfel.radius),
+      .albedo = {},
+      .rise = static_cast<std::uint8_t>(8 * rise)};
+  for (int c = 0; c < 3; ++c) {
+    payload.albedo[static_cast<std::size_t>(c)] =
+        static_cast<std::uint8_t>(std::lround(surfel.albedo[c] * 255));
+  }
+  return payload;
 }
 
 std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, PointSource& surfels,
                                           const Camera& camera, unsigned side,
                                           const Executor& executor) {
-  auto view = std::make_unique<SurfelView>(scene, camera, side, 0.0F);
+  auto view = std::make_unique<DrawnView>(scene, camera, side, 0.0F);
   view->draw(surfels, executor);
-  view->finish(executor);
   return view;
 }
 

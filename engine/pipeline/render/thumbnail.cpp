@@ -31,7 +31,7 @@ std::unique_ptr<PrimaryView> view_of(const ContainerReader& scene, const Camera&
                                      const Executor& executor) {
   Progress silent;
   if (scene.superblock().points <= kMostPoints)
-    return view_surfels(scene, camera, kSide, 0, nullptr, executor, silent);
+    return view_surfels(scene, camera, {.side = kSide}, executor, silent);
   return view_surfels(scene, *open_level(scene, kLevel, {}), camera, kSide, executor);
 }
 

@@ -48,17 +48,17 @@ unsigned SceneReader::lost_children(std::uint32_t page, std::uint16_t slot) {
   }
   unsigned lost = 0;
   for (int i = 0; i < count; ++i)
-    lost |= (is_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
+    lost |= (needs_lost(children[static_cast<std::size_t>(i)]) ? 1U : 0U) << i;
   return lost;
 }
 
-bool SceneReader::is_lost(const ChildRef& child) {
-  if (child.interior) return view_.lost()->contains(view_.node_page(child.page), pages_);
+bool SceneReader::needs_lost(const ChildRef& child) {
+  if (child.interior) return is_lost(view_.node_page(child.page));
   const std::uint64_t end = child.first_point + child.point_count,
                       per_page = view_.points_per_page();
   for (std::uint64_t point = child.first_point; point < end;
        point = (point / per_page + 1) * per_page) {
-    if (view_.lost()->contains(view_.point_page(point), pages_)) return true;
+    if (is_lost(view_.point_page(point))) return true;
   }
   return false;
 }

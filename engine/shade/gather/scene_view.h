@@ -92,6 +92,11 @@ class SceneReader {
   [[nodiscard]] PinnedGroup group(std::uint32_t page, std::uint16_t slot);
   /// Returns which children of a group need a lost page: bit i for child i.
   [[nodiscard]] unsigned lost_children(std::uint32_t page, std::uint16_t slot);
+  /// Reports whether a page is damaged and to be left out. No page may be pinned by this.
+  /// @param page  number of the page
+  [[nodiscard]] bool is_lost(std::uint32_t page) {
+    return view_.lost() && view_.lost()->contains(page, pages_);
+  }
   /// Pins the page that holds a point.
   [[nodiscard]] PageGuard points(std::uint64_t point) {
     return pages_.pin(view_.point_page(point));
@@ -99,7 +104,7 @@ class SceneReader {
 
  private:
   /// Reports whether a child needs a lost page.
-  [[nodiscard]] bool is_lost(const ChildRef& child);
+  [[nodiscard]] bool needs_lost(const ChildRef& child);
 
   const SceneView& view_;
   PageReader pages_;

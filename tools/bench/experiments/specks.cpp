@@ -87,7 +87,7 @@ class PicturePair {
               const Executor& executor)
       : width_(camera.width), height_(camera.height), no_light_(mesh, {}) {
     Progress silent;
-    const auto points = view_surfels(scene, camera, 1, lift, nullptr, executor, silent);
+    const auto points = view_surfels(scene, camera, {.lift = lift}, executor, silent);
     const auto truth = view_mesh(mesh, no_light_, {0, 0, 0}, camera, 1, 0);
     for (unsigned y = 0; y < height_; ++y) {
       for (unsigned x = 0; x < width_; ++x) {

@@ -198,7 +198,7 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
   std::optional<DirectLight> light;
   std::unique_ptr<PrimaryView> view;
   if (lit_.mesh.triangles.empty()) {
-    view = view_surfels(*container_, camera, 1, options.lift, nullptr, executor, progress);
+    view = view_surfels(*container_, camera, {.lift = options.lift}, executor, progress);
   } else {
     rays.emplace(lit_.mesh);
     light.emplace(*rays, lit_.lights);
