@@ -164,10 +164,12 @@ class PathTracer {
       const bool lit = hit->front || reflected == 0 || is_double_sided(hit->triangle);
       if (!lit || reflected == reflections_) return sum;
 
-      // Reflect the light of lamps, then go on
+      // Reflect the light of lamps, then go on. Rays begin off the surface and a little back
+      // towards where the path came from, which is clear of both walls where it met their edge.
       const float turn = hit->front ? 1.0F : -1.0F;
       const glm::vec3 plane = turn * hit->geometric_normal;
-      const Place place{hit->position + step_ * glm::dvec3(plane), turn * hit->normal, plane};
+      const Place place{hit->position + step_ * glm::dvec3(plane - direction), turn * hit->normal,
+                        plane};
       const SurfaceNumbers numbers =
           reflected == 0 ? first
                          : SurfaceNumbers{{random.next(), random.next()},
