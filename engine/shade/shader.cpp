@@ -57,17 +57,41 @@ std::vector<std::size_t> Shader::z_order(std::span<const Receiver> receivers,
 
 void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results,
                    Progress& progress, unsigned variant) {
-  variant %= static_cast<unsigned>(grids_.size());
-  const std::vector<std::size_t> order = z_order(receivers, variant);
-  const std::size_t blocks = (order.size() + kBlock - 1) / kBlock;
-  executor_.for_each(blocks, [&](std::size_t block, unsigned thread) {
-    const auto indices =
-        std::span(order).subspan(block * kBlock, std::min(kBlock, order.size() - block * kBlock));
+  std::vector<std::size_t> counts(variant % grids_.size() + 1);
+  counts.back() = receivers.size();
+  shade_variants(receivers, results, progress, counts);
+}
+
+void Shader::shade_variants(std::span<const Receiver> receivers, std::span<Shading> results,
+                            Progress& progress, std::span<const std::size_t> counts) {
+  // Cut the receivers of each variant into blocks along the Z-curve
+  struct Run {
+    std::size_t variant, number;
+    std::size_t first;  ///< in its variant's order
+  };
+  std::vector<Run> blocks;
+  std::vector<std::size_t> begins(1, 0);
+  std::vector<std::vector<std::size_t>> orders;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    orders.push_back(
+        z_order(receivers.subspan(begins[i], counts[i]), static_cast<unsigned>(i % grids_.size())));
+    begins.push_back(begins[i] + counts[i]);
+    for (std::size_t first = 0; first < counts[i]; first += kBlock)
+      blocks.push_back({i, first / kBlock, first});
+  }
+  // Shade them, block by block of all variants
+  std::ranges::stable_sort(blocks, {}, &Run::number);
+  executor_.for_each(blocks.size(), [&](std::size_t index, unsigned thread) {
+    const Run& block = blocks[index];
+    const std::span<const std::size_t> order(orders[block.variant]);
+    const auto indices = order.subspan(block.first, std::min(kBlock, order.size() - block.first));
+    const std::size_t begin = begins[block.variant];
     std::vector<Receiver> in(indices.size());
     std::vector<Shading> out(indices.size());
-    std::ranges::transform(indices, in.begin(), [&](std::size_t i) { return receivers[i]; });
-    gather(thread).shade(in, out, *grids_[variant]);
-    for (std::size_t i = 0; i < indices.size(); ++i) results[indices[i]] = out[i];
+    std::ranges::transform(indices, in.begin(),
+                           [&](std::size_t i) { return receivers[begin + i]; });
+    gather(thread).shade(in, out, *grids_[block.variant % grids_.size()]);
+    for (std::size_t i = 0; i < indices.size(); ++i) results[begin + indices[i]] = out[i];
     progress.advance(indices.size());
   });
 }

@@ -52,6 +52,11 @@ class Shader {
   /// @throws FormatError for a damaged page, unless ShadeOptions::lost is set; std::system_error
   void shade(std::span<const Receiver> receivers, std::span<Shading> results, Progress& progress,
              unsigned variant = 0);
+  /// Shades receivers with several variants as shade() does those of each, but in an order in which
+  /// all variants shade what is close together one after another, so that they find the same pages.
+  /// @param counts  by variant: how many of the receivers it shades, those of variant 0 first
+  void shade_variants(std::span<const Receiver> receivers, std::span<Shading> results,
+                      Progress& progress, std::span<const std::size_t> counts);
 
   /// The counts of all calls so far.
   [[nodiscard]] GatherCounts counts() const;

@@ -52,6 +52,17 @@ void check_combination(const LightingRequest& request) {
   }
 }
 
+// Settings of the gather for receivers that lie far apart (spec/shading.md#sparse-pictures)
+constexpr float kSparseSolidAngle = 0.06F, kSparseParallax = 0.3F;
+constexpr unsigned kSparseResolution = 16;
+
+/// Says whether a request leaves the settings of the gather as they are when nothing is said.
+bool has_usual_settings(const GatherOptions& gather) {
+  const GatherOptions usual;
+  return gather.solid_angle == usual.solid_angle && gather.parallax == usual.parallax &&
+         gather.inflation == usual.inflation && gather.resolution == usual.resolution;
+}
+
 /// Returns the length of the diagonal of a scene's bounds, scene units.
 double diagonal_of(const ContainerReader& scene) {
   const Superblock& s = scene.superblock();
@@ -162,9 +173,14 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
       executor_, report_, progress_);
 }
 
-void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
+void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse) {
   ReceiverPlaces compared;
   std::vector<Receiver> pilots_compared;
+  if (sparse && !request_.error && has_usual_settings(request_.gather)) {
+    options_.gather.solid_angle = kSparseSolidAngle;
+    options_.gather.parallax = kSparseParallax;
+    options_.gather.resolution = kSparseResolution;
+  }
   if (request_.error || request_.estimate) {
     const std::vector<Pilot> pilots = find_pilots();
     pilots_compared = compared_of(pilots);
@@ -220,13 +236,16 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots) {
   }
 }
 
-LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned variant) {
+LitReceivers Lighting::shade(std::span<const Receiver> receivers,
+                             std::span<const std::size_t> counts) {
+  const std::array all{receivers.size()};
+  if (counts.empty()) counts = all;
   results_.resize(receivers.size());
   const double before = cpu_seconds();
   if (receiver_rays() > 0) {
     rays_->trace(receivers, receiver_rays(), kRunSeed + report_.receivers, results_, progress_);
   } else {
-    shader_->shade(receivers, results_, progress_, variant);
+    shader_->shade_variants(receivers, results_, progress_, counts);
   }
   report_.shade_cpu_seconds += cpu_seconds() - before;
   LitReceivers lit{.shading = results_};
@@ -238,7 +257,16 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers, unsigned varia
     lit.reflections = reflections_;
   }
   report_.receivers += receivers.size();
-  if (estimator_) lit.estimates = estimator_->estimate(receivers, results_, variant);
+  if (estimator_) {
+    estimates_.clear();
+    for (std::size_t variant = 0, from = 0; variant < counts.size(); from += counts[variant++]) {
+      const std::span<const ErrorEstimate> some = estimator_->estimate(
+          receivers.subspan(from, counts[variant]),
+          std::span(results_).subspan(from, counts[variant]), static_cast<unsigned>(variant));
+      estimates_.insert(estimates_.end(), some.begin(), some.end());
+    }
+    lit.estimates = estimates_;
+  }
   sample_->add(receivers, lit);
   return lit;
 }

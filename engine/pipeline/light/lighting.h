@@ -148,8 +148,12 @@ class Lighting {
 
   /// Chooses the settings and prepares the estimates, as far as the request asks for them.
   /// @param find_pilots  returns receivers that stand for the run; called only when needed
+  /// @param sparse       receivers lie so far apart that they share little: the gather takes
+  /// coarser
+  ///                     settings (spec/shading.md#sparse-pictures), unless the request names an
+  ///                     error or settings
   /// @pre prepare()
-  void tune(const std::function<std::vector<Pilot>()>& find_pilots);
+  void tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse = false);
 
   /// The memory of the page cache, bytes, which is free for other uses between two phases.
   /// @pre prepare()
@@ -166,11 +170,11 @@ class Lighting {
 
   /// Shades a block of receivers. They should follow the Z-curve from call to call, because
   /// neighbours share pages.
-  /// @param variant  as for Shader::shade()
-  /// @return         one result for each receiver, valid until the next call
+  /// @param counts  as for Shader::shade_variants(); empty: variant 0 shades them all
+  /// @return        one result for each receiver, valid until the next call
   /// @throws FormatError when a page is damaged and damage is not tolerated; std::system_error
   /// @pre tune()
-  LitReceivers shade(std::span<const Receiver> receivers, unsigned variant = 0);
+  LitReceivers shade(std::span<const Receiver> receivers, std::span<const std::size_t> counts = {});
 
   /// Completes the report and frees the page cache. Nothing can be shaded afterwards.
   void finish();
@@ -199,6 +203,7 @@ class Lighting {
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
   std::vector<Reflection> reflections_;
+  std::vector<ErrorEstimate> estimates_;
 
   /// The container that receivers look at.
   [[nodiscard]] const ContainerReader& lit() const noexcept {

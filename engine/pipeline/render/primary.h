@@ -45,6 +45,9 @@ class PrimaryView {
   /// Returns the nearest surface behind a sample; nothing where the camera sees the sky.
   /// @param x, y  place on the grid of samples, width * side by height * side, (0, 0) top left
   [[nodiscard]] virtual std::optional<PrimaryHit> at(unsigned x, unsigned y) const = 0;
+  /// Returns the share of the samples that see a surface so far away that neighbours of them lie
+  /// more than a radius of its surfels apart; 0 where the camera sees no surfels.
+  [[nodiscard]] virtual double sparse_share() const { return 0; }
 };
 
 /// Makes a view that traces rays at a mesh and lights it by shadow rays.

@@ -1,11 +1,12 @@
-// A picture is rendered tile by tile. Within a tile, sample s of every pixel is shaded in one go,
-// with variant s of the gather, so that the errors of a pixel's samples differ and average out:
+// A picture is rendered tile by tile. Within a tile, sample s of every pixel is shaded with variant
+// s of the gather, so that the errors of a pixel's samples differ and average out. Up to 16 samples
+// of all pixels are shaded in one go, for they see the same pages:
 //
-//   +--------+--------+--      one pixel, side = 2      for each tile
-//   |  tile  |        |          +---+---+                for each sample s
-//   | 256^2  |        |          | 0 | 1 |                  hits of sample s in all pixels
-//   +--------+--------+--        +---+---+                  shade the hits with variant s
-//   |        |        |          | 2 | 3 |                  add results, or the sky, to the film
+//   +--------+--------+--      one pixel, side = 2      for each tile, for every 16 samples
+//   |  tile  |        |          +---+---+                hits of each sample in all pixels
+//   | 2^16   |        |          | 0 | 1 |                shade the hits, sample s with variant s
+//   +--------+--------+--        +---+---+                add results, or the sky, to the film
+//   |samples |        |          | 2 | 3 |
 //                                +---+---+
 #include "engine/pipeline/render/render_picture.h"
 
@@ -36,8 +37,8 @@
 namespace ptc {
 namespace {
 
-constexpr unsigned kTileSide = 256;  // pixels
-constexpr unsigned kMaxVariants = 16;
+constexpr unsigned kTileSide = 256;  // samples that are shaded in one go
+constexpr unsigned kMaxVariants = 16, kMaxVariantSide = 4;
 // Bytes of a sample in the depth buffer of view_surfels(), of a pixel of a tile (hit, receiver,
 // result, order), and of what estimates add to that pixel
 constexpr std::uint64_t kSplatBytes = 24;
@@ -242,13 +243,14 @@ class TileRenderer {
 
   void render_all(Progress& progress) {
     const Camera& camera = subject_.camera;
-    for (unsigned y = 0; y < camera.height; y += kTileSide) {
-      for (unsigned x = 0; x < camera.width; x += kTileSide) {
-        const Tile tile{x, y, std::min(camera.width - x, kTileSide),
-                        std::min(camera.height - y, kTileSide)};
-        for (unsigned sample = 0; sample < subject_.side * subject_.side; ++sample) {
-          render(tile, sample, progress);
-        }
+    const unsigned samples = subject_.side * subject_.side;
+    const unsigned at_once = std::min(samples, kMaxVariants);
+    const unsigned side = kTileSide / std::min(subject_.side, kMaxVariantSide);
+    for (unsigned y = 0; y < camera.height; y += side) {
+      for (unsigned x = 0; x < camera.width; x += side) {
+        const Tile tile{x, y, std::min(camera.width - x, side), std::min(camera.height - y, side)};
+        for (unsigned first = 0; first < samples; first += at_once)
+          render(tile, first, std::min(at_once, samples - first), progress);
       }
     }
   }
@@ -257,18 +259,23 @@ class TileRenderer {
   /// A rectangle of pixels.
   struct Tile {
     unsigned x0, y0, width, height;
+    [[nodiscard]] std::size_t pixels() const { return std::size_t{width} * height; }
   };
 
-  /// @param sample  0 to side^2 - 1
-  void render(const Tile& tile, unsigned sample, Progress& progress) {
-    find_hits(tile, sample);
+  /// Renders some samples of each pixel of a tile.
+  /// @param first  number of the first one, 0 to side^2 - 1
+  void render(const Tile& tile, unsigned first, unsigned count, Progress& progress) {
+    find_hits(tile, first, count);
     receivers_.clear();
-    for (const auto& hit : hits_) {
-      if (hit) receivers_.push_back(receiver_at(*hit));
+    std::vector<std::size_t> counts(count);
+    for (std::size_t i = 0; i < hits_.size(); ++i) {
+      if (!hits_[i]) continue;
+      receivers_.push_back(receiver_at(*hits_[i]));
+      ++counts[i / tile.pixels()];
     }
-    LitReceivers lit = lighting_.shade(receivers_, sample);
+    LitReceivers lit = lighting_.shade(receivers_, counts);
     lit.shadows = find_shadows();
-    expose(tile, sample, lit);
+    expose(tile, first, lit);
     progress.advance(hits_.size() - receivers_.size());
   }
 
@@ -292,25 +299,27 @@ class TileRenderer {
     return shadows_;
   }
 
-  void find_hits(const Tile& tile, unsigned sample) {
-    hits_.assign(std::size_t{tile.width} * tile.height, std::nullopt);
-    lighting_.executor().for_each(tile.height, [&](std::size_t row, unsigned) {
+  void find_hits(const Tile& tile, unsigned first, unsigned count) {
+    hits_.assign(tile.pixels() * count, std::nullopt);
+    lighting_.executor().for_each(std::size_t{tile.height} * count, [&](std::size_t i, unsigned) {
+      const auto row = static_cast<unsigned>(i % tile.height),
+                 sample = first + static_cast<unsigned>(i / tile.height);
       for (unsigned column = 0; column < tile.width; ++column) {
-        const auto [x, y] = sample_at(tile.x0 + column, tile.y0 + static_cast<unsigned>(row),
-                                      sample, subject_.side);
-        hits_[row * tile.width + column] = subject_.view->at(x, y);
+        const auto [x, y] = sample_at(tile.x0 + column, tile.y0 + row, sample, subject_.side);
+        hits_[i * tile.width + column] = subject_.view->at(x, y);
       }
     });
   }
 
-  void expose(const Tile& tile, unsigned sample, const LitReceivers& lit) {
+  void expose(const Tile& tile, unsigned first, const LitReceivers& lit) {
     const unsigned side = subject_.side;
     const float weight = 1.0f / static_cast<float>(side * side);
     const float scale = 1.0f / static_cast<float>(side);
     std::size_t next = 0;
     for (std::size_t i = 0; i < hits_.size(); ++i) {
-      const unsigned x = tile.x0 + static_cast<unsigned>(i % tile.width);
-      const unsigned y = tile.y0 + static_cast<unsigned>(i / tile.width);
+      const std::size_t place = i % tile.pixels();
+      const unsigned x = tile.x0 + static_cast<unsigned>(place % tile.width);
+      const unsigned y = tile.y0 + static_cast<unsigned>(place / tile.width);
       const std::size_t pixel = std::size_t{y} * subject_.camera.width + x;
       if (hits_[i]) {
         if (!lit.estimates.empty()) film_.add(pixel, lit.estimates[next], weight);
@@ -319,6 +328,7 @@ class TileRenderer {
         if (!lit.reflections.empty()) film_.add(pixel, lit.reflections[next], weight);
         film_.add(pixel, *hits_[i], lit.shading[next++], weight);
       } else {
+        const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
         const auto [sx, sy] = sample_at(x, y, sample, side);
         const glm::vec3 direction = subject_.camera.direction(
             (static_cast<float>(sx) + 0.5f) * scale, (static_cast<float>(sy) + 0.5f) * scale);
@@ -439,7 +449,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   }
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
   Film film(subject.camera.width, subject.camera.height, extras_of(request));
-  lighting.tune([&] { return pilots_of(subject, lighting.executor()); });
+  const bool sparse = !sees_mesh && subject.view->sparse_share() > 0.5;
+  lighting.tune([&] { return pilots_of(subject, lighting.executor()); }, sparse);
 
   // Render all samples into the film
   {

@@ -168,6 +168,18 @@ std::optional<PrimaryHit> SplatView::at(unsigned x, unsigned y) const {
   return hit;
 }
 
+double SplatView::sparse_share() const {
+  constexpr float kSparse = 1;  // radii
+  std::size_t seen = 0, sparse = 0;
+  for (const SplatSample& sample : samples_) {
+    if (sample.empty()) continue;
+    ++seen;
+    const float radius = scale_.radius(decode_ufloat16(sample.payload.radius));
+    if (sample.depth > kSparse * radius * focal_) ++sparse;
+  }
+  return seen == 0 ? 0 : static_cast<double>(sparse) / static_cast<double>(seen);
+}
+
 SplatPayload SplatView::payload_of(const Surfel& surfel, float rise) {
   const glm::vec3 light = surfel.outgoing();
   SplatPayload payload{

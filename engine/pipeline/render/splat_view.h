@@ -35,6 +35,7 @@ class SplatView : public PrimaryView {
   SplatView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift);
 
   [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override;
+  [[nodiscard]] double sparse_share() const override;
 
  protected:
   /// Closes the holes between the discs. To be called once, when the depth buffer is full.

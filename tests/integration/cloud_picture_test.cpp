@@ -1,0 +1,114 @@
+// Pictures of clouds: seen by rays, and lit as coarsely as their samples lie apart.
+#include <algorithm>
+#include <array>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "engine/io/image/image.h"
+#include "engine/parallel/thread_pool.h"
+#include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/render/overview.h"
+#include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/render_picture.h"
+#include "engine/shade/shader.h"
+#include "tests/support/temporary_directory.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+/// A city of 30,000 points, lit by a build.
+struct City {
+  TemporaryDirectory dir;
+  RenderRequest request;
+
+  City() {
+    BuildRequest build;
+    build.city_points = 30'000;
+    Progress silent;
+    build_container(build, dir / "city.ptcx", silent);
+    request.scene = dir / "city.ptcx";
+    request.size = {{20, 12}};
+  }
+
+  [[nodiscard]] Image render(const RenderRequest& asked, LightingReport* report = nullptr) const {
+    const PictureTarget target{dir / "picture.exr"};
+    Progress silent;
+    const LightingReport made = render_picture(asked, {&target, 1}, silent);
+    if (report) *report = made;
+    return read_image(dir / "picture.exr");
+  }
+};
+
+}  // namespace
+
+TEST_CASE("cloud picture: neither threads nor the cap change a pixel",
+          "[integration][render][cloud]") {
+  City city;
+  city.request.size = {{96, 54}};
+  city.request.run = {.memory_bytes = std::uint64_t{1} << 30, .threads = 1};
+  const Image one = city.render(city.request);
+  CHECK(std::ranges::count(one.pixels, one.pixels.front()) <
+        static_cast<std::ptrdiff_t>(one.pixels.size() * 9 / 10));  // which is the sky
+  city.request.run = {.memory_bytes = std::uint64_t{118} << 20, .threads = 3};
+  const Image other = city.render(city.request);
+  CHECK((other.pixels == one.pixels));
+}
+
+TEST_CASE("cloud picture: far samples are gathered coarsely, unless the request says how",
+          "[integration][render][cloud]") {
+  City city;
+  RenderRequest coarse = city.request;
+  coarse.gather.solid_angle = 0.06F;
+  coarse.gather.parallax = 0.3F;
+  coarse.gather.resolution = 16;
+  RenderRequest named = city.request;
+  named.gather.solid_angle = 0.0101F;
+  // From afar
+  const Image usual = city.render(city.request);
+  CHECK((city.render(coarse).pixels == usual.pixels));
+  CHECK((city.render(named).pixels != usual.pixels));
+  // From so close that samples share their surfels
+  const ContainerReader scene(city.request.scene);
+  Camera near = overview(scene, {0, 1, 0}, {}, {});
+  near.position = near.look_at + 0.2 * (near.position - near.look_at);
+  for (RenderRequest* request : {&city.request, &coarse}) request->camera = near;
+  CHECK((city.render(coarse).pixels != city.render(city.request).pixels));
+}
+
+TEST_CASE("cloud picture: variants by turns shade what each shades alone",
+          "[integration][render][cloud]") {
+  const City city;
+  const ContainerReader scene(city.request.scene);
+  const ThreadPool executor(2);
+  Progress silent;
+  Camera camera = overview(scene, {0, 1, 0}, {}, {});
+  camera.width = 240;
+  camera.height = 135;
+  const auto view = view_surfels(scene, camera, {.lift = 0.15F}, executor, silent);
+  std::vector<Receiver> receivers;
+  for (unsigned y = 0; y < camera.height; ++y) {
+    for (unsigned x = 0; x < camera.width; ++x) {
+      if (const auto hit = view->at(x, y)) {
+        receivers.push_back(
+            {hit->position + glm::dvec3(hit->offset_normal * hit->lift), hit->normal});
+      }
+    }
+  }
+  REQUIRE(receivers.size() > Shader::kBlock + 100);
+  const std::size_t first = Shader::kBlock + 50;  // of variant 0
+  const std::array<std::size_t, 3> counts{first, 0, receivers.size() - first};
+  std::vector<Shading> together(receivers.size()), alone(receivers.size());
+  Shader shader(scene, {.cache_bytes = 64U << 20, .variants = 3}, executor);
+  shader.shade_variants(receivers, together, silent, counts);
+  const auto all = std::span(receivers);
+  const auto results = std::span(alone);
+  shader.shade(all.first(first), results.first(first), silent, 0);
+  shader.shade(all.subspan(first), results.subspan(first), silent, 2);
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    REQUIRE(together[i].occlusion == alone[i].occlusion);
+    REQUIRE(together[i].irradiance == alone[i].irradiance);
+  }
+}
