@@ -22,12 +22,12 @@ namespace {
 constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
 
 /// Returns the coarser settings of the bounces before the last: a receiver sees many points, and
-/// their errors average out over them. The resolution stays, because thin things that are drawn too
-/// wide hide too much of what they light, everywhere alike.
+/// their errors average out over them. The solid angle and the resolution stay: clusters that hold
+/// something bright and what hides it, or thin things that are drawn too wide, are wrong everywhere
+/// alike.
 GatherOptions coarser(const GatherOptions& gather) {
   GatherOptions coarse = gather;
   coarse.around = {};
-  coarse.solid_angle *= 3;
   coarse.parallax *= 2;
   return coarse;
 }

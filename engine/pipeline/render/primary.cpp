@@ -41,12 +41,13 @@ class MeshView : public PrimaryView {
     // through the gap that they leave along the edge
     const glm::dvec3 place = hit->position - glm::dvec3(direction) * double{kStepBack * lift_};
     const glm::dvec3 geometric(hit->geometric_normal * turn);
-    PrimaryHit primary{.position = place,
-                       .surface = hit->position + geometric * scene_.epsilon(),
-                       .normal = hit->normal * turn,
-                       .lift = lift_,
-                       .offset_normal = hit->geometric_normal * turn,
-                       .albedo = hit->albedo};
+    PrimaryHit primary{
+        .position = place,
+        .surface = hit->position + (geometric - glm::dvec3(direction)) * scene_.epsilon(),
+        .normal = hit->normal * turn,
+        .lift = lift_,
+        .offset_normal = hit->geometric_normal * turn,
+        .albedo = hit->albedo};
     const std::uint64_t seed = std::uint64_t{y} << 32 | x;
     const DirectLight::Result light =
         light_.irradiance(primary.surface, primary.normal, sampling_, seed);
