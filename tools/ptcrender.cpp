@@ -71,7 +71,8 @@ void add_layers(ptc::Command& command, Arguments& arguments) {
   };
   CLI::Option* layers = command.app().add_option_function<std::vector<std::string>>(
       "--layer", set,
-      "Also write direct, indirect, occlusion, albedo or reflection as PNG; repeatable");
+      "Also write a layer as PNG; repeatable\n"
+      "Layers are direct, indirect, occlusion, albedo and, with --glossy, reflection.");
   ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo=", "reflection=", ".png"})
       ->type_name("LAYER=FILE")
       ->group(ptc::kFilesGroup)
