@@ -38,6 +38,13 @@ ordered_json facts_of(const CheckError& error) {
           {"relative", error.relative()}};
 }
 
+ordered_json facts_of(const GatherOptions& gather) {
+  return {{"solid_angle", gather.solid_angle},
+          {"parallax", gather.parallax},
+          {"resolution", gather.resolution},
+          {"inflation", gather.inflation}};
+}
+
 ordered_json facts_of(const EstimateWorth& worth) {
   return {{"rank", worth.rank},
           {"top_tenth", worth.top_tenth},
@@ -230,6 +237,7 @@ ordered_json facts_of(const LightingReport& report) {
                      {"shade_cpu_seconds", report.shade_cpu_seconds},
                      {"bounce_cpu_seconds", report.bounce_cpu_seconds},
                      {"glossy_cpu_seconds", report.glossy_cpu_seconds},
+                     {"settings", facts_of(report.settings)},
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};
   if (report.tuning) facts["tuning"] = facts_of(*report.tuning);

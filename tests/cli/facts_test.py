@@ -181,6 +181,9 @@ class Facts(ProgramTest):
                 facts = json.loads(self.succeed(program, self.scene, "-o", self.here / name, *picture,
                                                 "--bounces", bounces, "--json").stdout)
                 self.assertEqual(facts["bounces"], bounces)
+                self.assertEqual(list(facts["settings"]), ["solid_angle", "parallax", "resolution", "inflation"])
+                if program == "ptcshade":
+                    self.assertEqual(list(facts["settings"].values())[2:], [32, 2])
                 self.assertEqual(facts["bounce_cpu_seconds"] > 0, bounces > 1)
                 self.assertEqual([s for s in facts["seconds"] if s.startswith("bounce")],
                                  ["bounce 1", "bounce 2"] if bounces > 1 else [])

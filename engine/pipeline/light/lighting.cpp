@@ -211,6 +211,8 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     }
   }
 
+  report_.settings = options_.gather;
+
   // Start the sample for check(), without the pilots, and the gather or the rays
   sample_.emplace(request_.check, std::move(compared));
   RayOptions with = ray_options(options_);

@@ -102,6 +102,7 @@ struct LightingReport {
   double shade_cpu_seconds = 0;            ///< CPU time of the last bounce, all threads
   double bounce_cpu_seconds = 0;           ///< CPU time of earlier bounces' gathers, all threads
   double glossy_cpu_seconds = 0;           ///< CPU time of reflections, all threads
+  GatherOptions settings;                  ///< of the last bounce's gather; unused by rays
   GatherCounts gather;                     ///< work of the last bounce's gather; none by rays
   CacheStatistics cache;                   ///< page cache of the last bounce
   std::optional<TuningReport> tuning;      ///< present when an error was asked for
@@ -148,10 +149,9 @@ class Lighting {
 
   /// Chooses the settings and prepares the estimates, as far as the request asks for them.
   /// @param find_pilots  returns receivers that stand for the run; called only when needed
-  /// @param sparse       receivers lie so far apart that they share little: the gather takes
-  /// coarser
-  ///                     settings (spec/shading.md#sparse-pictures), unless the request names an
-  ///                     error or settings
+  /// @param sparse       receivers lie far apart and share little: unless the request names an
+  ///                     error or settings, the gather takes coarser ones
+  ///                     (spec/shading.md#sparse-pictures)
   /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse = false);
 

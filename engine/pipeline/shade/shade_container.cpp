@@ -323,9 +323,9 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   check_count(receivers, target);
   const ShadedExtras extras = extras_of(request);
   check_shaded_sink(target, receivers.container, extras);
-  const LightRig recorded = recorded_lights(lighting.scene(), progress);
-  const Sky sky = request.sky ? *request.sky : recorded.sky;
-  const std::vector<LightRig> rigs = rigs_of_groups(recorded, request.shadows);
+  const Sky sky = request.sky ? *request.sky : recorded_lights(lighting.scene(), progress).sky;
+  const std::vector<LightRig> rigs =
+      rigs_of_groups(recorded_rig(lighting.scene()), request.shadows);
 
   // Divide the memory, shade earlier bounces, choose the settings
   MemoryBudget budget = budget_of(request.run.memory_bytes, "shading");
