@@ -71,6 +71,8 @@ AttributeRows::AttributeRows(const ContainerReader& container, std::span<const s
 }
 
 std::span<const std::byte> AttributeRows::read(std::size_t rank, std::uint32_t count) {
+  if (rank == rank_) return rows_;
+  rank_ = kNone;  // so that nothing half read is returned where reading fails
   rows_.resize(count * row_bytes_);
   std::size_t at = 0;
   for (std::span<const Channel> rest = channels_; !rest.empty();) {
@@ -83,6 +85,7 @@ std::span<const std::byte> AttributeRows::read(std::size_t rank, std::uint32_t c
     at = columns_to_rows(rest.first(channels), payload_, count, rows_, row_bytes_, at);
     rest = rest.subspan(channels);
   }
+  rank_ = rank;
   return rows_;
 }
 

@@ -28,7 +28,8 @@ class AttributeRows {
 
   /// Returns the bytes of a row; 0 without channels.
   [[nodiscard]] std::size_t row_bytes() const noexcept { return row_bytes_; }
-  /// Returns the rows of the points of a point page, valid until the next call.
+  /// Returns the rows of the points of a point page, valid until the next call. The page that was
+  /// asked for last is not read again.
   /// @param rank   of the point page
   /// @param count  points of that page
   /// @throws FormatError when an attribute page is damaged; std::system_error
@@ -40,6 +41,9 @@ class AttributeRows {
   std::size_t row_bytes_ = 0;
   PageDecoder decoder_;
   std::vector<std::byte> payload_, rows_;
+  std::size_t rank_ = kNone;  ///< of the page whose rows are held
+
+  static constexpr std::size_t kNone = ~std::size_t{0};
 };
 
 /// Writes columns as rows: column after column of `payload` into every row from `at` on.

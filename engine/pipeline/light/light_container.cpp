@@ -51,20 +51,15 @@ class Rises {
   [[nodiscard]] float radii(std::uint64_t point, std::uint64_t points) {
     if (rows_.row_bytes() == 0) return 0;
     const std::uint64_t page = point / per_page_, first = page * per_page_;
-    if (page != page_) {
-      page_ = page;
-      page_rows_ = rows_.read(static_cast<std::size_t>(page),
-                              static_cast<std::uint32_t>(std::min(per_page_, points - first)));
-    }
-    return rise_.radii(page_rows_.data() + (point - first) * rows_.row_bytes());
+    const auto rows = rows_.read(static_cast<std::size_t>(page),
+                                 static_cast<std::uint32_t>(std::min(per_page_, points - first)));
+    return rise_.radii(rows.data() + (point - first) * rows_.row_bytes());
   }
 
  private:
   AttributeRows rows_;
   RisePlace rise_;
   std::uint64_t per_page_;
-  std::uint64_t page_ = ~std::uint64_t{0};  // whose rows these are
-  std::span<const std::byte> page_rows_;
 };
 
 /// The points of a scene with the light of a rig in place of their own, kBatch at a time.

@@ -89,10 +89,8 @@ class PointCursor {
         if (!scan_.next()) break;
         at_ = 0;
       }
-      if (rows && scan_.whole() && page_of_rows_ != scan_.index()) {
-        page_of_rows_ = scan_.index();
-        page_rows_ = rows_.read(scan_.index(), scan_.count());
-      }
+      std::span<const std::byte> page_rows;
+      if (rows && scan_.whole()) page_rows = rows_.read(scan_.index(), scan_.count());
       const PointPage points = scan_.points();
       for (; at_ < points.size() && filled < out.size(); ++at_) {
         share_ += wanted_;
@@ -101,7 +99,7 @@ class PointCursor {
         if (!scan_.whole()) continue;
         out[filled++] = to_surfel(points[at_], container_.header().frame);
         if (!rows) continue;
-        const auto row = page_rows_.subspan(at_ * rows_.row_bytes(), rows_.row_bytes());
+        const auto row = page_rows.subspan(at_ * rows_.row_bytes(), rows_.row_bytes());
         rows->insert(rows->end(), row.begin(), row.end());
       }
     }
@@ -127,8 +125,6 @@ class PointCursor {
   PointScan scan_;
   std::uint32_t at_ = 0;  // next point of the page
   AttributeRows rows_;
-  std::span<const std::byte> page_rows_;        // of the page that follows
-  std::size_t page_of_rows_ = ~std::size_t{0};  // its index among the point pages
 };
 
 /// Returns the text by which a shaded container records its settings.
