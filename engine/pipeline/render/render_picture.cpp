@@ -1,13 +1,3 @@
-// A picture is rendered tile by tile. Within a tile, sample s of every pixel is shaded with variant
-// s of the gather, so that the errors of a pixel's samples differ and average out. Up to 16 samples
-// of all pixels are shaded in one go, for they see the same pages:
-//
-//   +--------+--------+--      one pixel, side = 2      for each tile, for every 16 samples
-//   |  tile  |        |          +---+---+                hits of each sample in all pixels
-//   | 2^16   |        |          | 0 | 1 |                shade the hits, sample s with variant s
-//   +--------+--------+--        +---+---+                add results, or the sky, to the film
-//   |samples |        |          | 2 | 3 |
-//                                +---+---+
 #include "engine/pipeline/render/render_picture.h"
 
 #include <algorithm>
@@ -30,6 +20,7 @@
 #include "engine/pipeline/light/group_shadows.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/tile_renderer.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/shade/lift.h"
@@ -37,8 +28,6 @@
 namespace ptc {
 namespace {
 
-constexpr unsigned kTileSide = 256;  // samples that are shaded in one go
-constexpr unsigned kMaxVariants = 16, kMaxVariantSide = 4;
 // Bytes of a sample in the depth buffer of view_surfels(), of a pixel of a tile (hit, receiver,
 // result, order), and of what estimates add to that pixel
 constexpr std::uint64_t kSplatBytes = 24;
@@ -53,8 +42,7 @@ struct Subject {
   Mesh mesh;          ///< empty: the camera sees the surfels
   std::unique_ptr<RayScene> rays;
   std::unique_ptr<DirectLight> light;
-  std::vector<std::unique_ptr<DirectLight>> shadow_lights;  ///< of a mesh, for each group
-  std::unique_ptr<DiscShadows> shadows;  ///< of surfels; null: none are asked for
+  PictureShadows shadows;
   bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
   std::unique_ptr<PrimaryView> view;
 
@@ -171,7 +159,7 @@ MemoryBudget picture_budget(const RenderRequest& request, const Part& part,
   const bool glossy = request.glossy.roughness.has_value();
   const std::uint64_t receiver =
       kReceiverBytes + (request.estimate ? kEstimateBytes : 0) + (glossy ? sizeof(Reflection) : 0);
-  budget.charge("a tile", std::uint64_t{kTileSide} * kTileSide * receiver);
+  budget.charge("a tile", TileRenderer::kSamplesAtOnce * receiver);
   budget.charge("the picture",
                 subject.pixels() * (Film::pixel_bytes(extras_of(request)) + part.held_bytes));
   if (subject.rays) {
@@ -180,15 +168,6 @@ MemoryBudget picture_budget(const RenderRequest& request, const Part& part,
     budget.charge("the depth buffer", subject.samples() * kSplatBytes);
   }
   return budget;
-}
-
-Receiver receiver_at(const PrimaryHit& hit) {
-  return {hit.position + glm::dvec3(hit.offset_normal * hit.lift), hit.normal};
-}
-
-/// Returns the place of a pixel's sample on the grid of all samples.
-std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample, unsigned side) {
-  return {x * side + sample % side, y * side + sample / side};
 }
 
 /// Returns windows of receivers that stand for all receivers of a picture. Windows in which the
@@ -230,123 +209,6 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
   pilots.resize(std::min(pilots.size(), plan.count));
   return pilots;
 }
-
-/// Renders a picture tile by tile, one sample of every pixel at a time. Each sample of a pixel is
-/// shaded with a variant of its own, so that what one of them resolves too coarsely averages out
-/// over the others.
-class TileRenderer {
- public:
-  /// @param sun_rays  shadow rays of a hit for each sun, where shadows are asked for
-  TileRenderer(const Subject& subject, const Sky& sky, unsigned sun_rays, Lighting& lighting,
-               Film& film)
-      : subject_(subject), sky_(sky), sun_rays_(sun_rays), lighting_(lighting), film_(film) {}
-
-  void render_all(Progress& progress) {
-    const Camera& camera = subject_.camera;
-    const unsigned samples = subject_.side * subject_.side;
-    const unsigned at_once = std::min(samples, kMaxVariants);
-    const unsigned side = kTileSide / std::min(subject_.side, kMaxVariantSide);
-    for (unsigned y = 0; y < camera.height; y += side) {
-      for (unsigned x = 0; x < camera.width; x += side) {
-        const Tile tile{x, y, std::min(camera.width - x, side), std::min(camera.height - y, side)};
-        for (unsigned first = 0; first < samples; first += at_once)
-          render(tile, first, std::min(at_once, samples - first), progress);
-      }
-    }
-  }
-
- private:
-  /// A rectangle of pixels.
-  struct Tile {
-    unsigned x0, y0, width, height;
-    [[nodiscard]] std::size_t pixels() const { return std::size_t{width} * height; }
-  };
-
-  /// Renders some samples of each pixel of a tile.
-  /// @param first  number of the first one, 0 to side^2 - 1
-  void render(const Tile& tile, unsigned first, unsigned count, Progress& progress) {
-    find_hits(tile, first, count);
-    receivers_.clear();
-    std::vector<std::size_t> counts(count);
-    for (std::size_t i = 0; i < hits_.size(); ++i) {
-      if (!hits_[i]) continue;
-      receivers_.push_back(receiver_at(*hits_[i]));
-      ++counts[i / tile.pixels()];
-    }
-    LitReceivers lit = lighting_.shade(receivers_, counts);
-    lit.shadows = find_shadows();
-    expose(tile, first, lit);
-    progress.advance(hits_.size() - receivers_.size());
-  }
-
-  /// Returns the shadows at the hits, hit after hit.
-  std::span<const float> find_shadows() {
-    if (subject_.shadows) return subject_.shadows->at(receivers_);
-    const auto& lights = subject_.shadow_lights;
-    shadows_.resize(receivers_.size() * lights.size());
-    if (lights.empty()) return shadows_;
-    std::vector<const PrimaryHit*> seen;
-    for (const auto& hit : hits_) {
-      if (hit) seen.push_back(&*hit);
-    }
-    lighting_.executor().for_each(seen.size(), [&](std::size_t i, unsigned) {
-      for (std::size_t group = 0; group < lights.size(); ++group) {
-        shadows_[i * lights.size() + group] =
-            lights[group]->shadow(seen[i]->surface, seen[i]->normal, sun_rays_, seed_ + i);
-      }
-    });
-    seed_ += seen.size();
-    return shadows_;
-  }
-
-  void find_hits(const Tile& tile, unsigned first, unsigned count) {
-    hits_.assign(tile.pixels() * count, std::nullopt);
-    lighting_.executor().for_each(std::size_t{tile.height} * count, [&](std::size_t i, unsigned) {
-      const auto row = static_cast<unsigned>(i % tile.height),
-                 sample = first + static_cast<unsigned>(i / tile.height);
-      for (unsigned column = 0; column < tile.width; ++column) {
-        const auto [x, y] = sample_at(tile.x0 + column, tile.y0 + row, sample, subject_.side);
-        hits_[i * tile.width + column] = subject_.view->at(x, y);
-      }
-    });
-  }
-
-  void expose(const Tile& tile, unsigned first, const LitReceivers& lit) {
-    const unsigned side = subject_.side;
-    const float weight = 1.0f / static_cast<float>(side * side);
-    const float scale = 1.0f / static_cast<float>(side);
-    std::size_t next = 0;
-    for (std::size_t i = 0; i < hits_.size(); ++i) {
-      const std::size_t place = i % tile.pixels();
-      const unsigned x = tile.x0 + static_cast<unsigned>(place % tile.width);
-      const unsigned y = tile.y0 + static_cast<unsigned>(place / tile.width);
-      const std::size_t pixel = std::size_t{y} * subject_.camera.width + x;
-      if (hits_[i]) {
-        if (!lit.estimates.empty()) film_.add(pixel, lit.estimates[next], weight);
-        const std::size_t groups = lit.shadows.size() / receivers_.size();
-        film_.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
-        if (!lit.reflections.empty()) film_.add(pixel, lit.reflections[next], weight);
-        film_.add(pixel, *hits_[i], lit.shading[next++], weight);
-      } else {
-        const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
-        const auto [sx, sy] = sample_at(x, y, sample, side);
-        const glm::vec3 direction = subject_.camera.direction(
-            (static_cast<float>(sx) + 0.5f) * scale, (static_cast<float>(sy) + 0.5f) * scale);
-        film_.add_sky(pixel, sky_.at(direction), weight);
-      }
-    }
-  }
-
-  const Subject& subject_;
-  const Sky& sky_;
-  unsigned sun_rays_;
-  Lighting& lighting_;
-  Film& film_;
-  std::vector<std::optional<PrimaryHit>> hits_;
-  std::vector<Receiver> receivers_;
-  std::vector<float> shadows_;
-  std::uint64_t seed_ = 0;  ///< hits whose shadows were found
-};
 
 /// Checks that every picture has a file of its own, which is none that the run reads.
 /// @throws RequestError
@@ -434,18 +296,18 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   MemoryBudget budget = picture_budget(request, part, subject);
   if (sees_mesh) {
     for (const LightRig& rig : rigs)
-      subject.shadow_lights.push_back(std::make_unique<DirectLight>(*subject.rays, rig));
+      subject.shadows.of_mesh.push_back(std::make_unique<DirectLight>(*subject.rays, rig));
   } else if (!rigs.empty()) {
     budget.charge("shadows", DiscShadows::bytes(lighting.scene(), rigs,
                                                 lighting.executor().threads(), request.back_end));
   }
   const bool by_emitters = sees_mesh ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
   lighting.prepare(std::move(budget), lights.sky, !by_emitters,
-                   std::min(request.samples, kMaxVariants), subject.camera.position,
+                   std::min(request.samples, TileRenderer::kMaxVariants), subject.camera.position,
                    targets.front().path);
   if (!sees_mesh && !rigs.empty()) {
-    subject.shadows = std::make_unique<DiscShadows>(lighting.scene(), rigs, request.gather.sides,
-                                                    request.back_end, lighting.executor());
+    subject.shadows.of_surfels = std::make_unique<DiscShadows>(
+        lighting.scene(), rigs, request.gather.sides, request.back_end, lighting.executor());
   }
   if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
   Film film(subject.camera.width, subject.camera.height, extras_of(request));
@@ -455,7 +317,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   // Render all samples into the film
   {
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
-    TileRenderer(subject, lights.sky, request.light_sampling.sun_rays, lighting, film)
+    TileRenderer({.camera = subject.camera, .side = subject.side, .view = *subject.view},
+                 subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting, film)
         .render_all(progress);
   }
   lighting.finish();  // frees the page cache, so that there is room for copies of the layers

@@ -1,0 +1,95 @@
+// Renders a picture into a film, tile by tile.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/light/group_shadows.h"
+#include "engine/pipeline/light/lighting.h"
+#include "engine/pipeline/render/film.h"
+#include "engine/pipeline/render/primary.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/light/direct_light.h"
+#include "engine/scene/light/lights.h"
+
+namespace ptc {
+
+/// What a camera sees.
+struct SeenThrough {
+  const Camera& camera;
+  unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
+  const PrimaryView& view;
+};
+
+/// The shadows of groups of lights that a picture shows: those of a mesh or those of surfels, or
+/// none.
+struct PictureShadows {
+  std::vector<std::unique_ptr<DirectLight>> of_mesh;  ///< for each group
+  std::unique_ptr<DiscShadows> of_surfels;
+};
+
+/// Returns where light is received at what a sample sees.
+[[nodiscard]] Receiver receiver_at(const PrimaryHit& hit);
+
+/// Returns the place of a pixel's sample on the grid of all samples.
+/// @param side  samples along the side of a pixel
+[[nodiscard]] std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample,
+                                                unsigned side);
+
+/// Renders all samples of a picture. Each sample of a pixel is shaded with a variant of its own, so
+/// that what one of them resolves too coarsely averages out over the others.
+class TileRenderer {
+ public:
+  /// The most variants that samples are shaded with.
+  static constexpr unsigned kMaxVariants = 16;
+  /// The most samples that are shaded in one go.
+  static constexpr std::uint64_t kSamplesAtOnce = std::uint64_t{1} << 16;
+
+  /// All but `seen` must outlive this.
+  /// @param sun_rays  shadow rays of a hit on a mesh for each sun, where shadows are asked for
+  /// @param lighting  tuned
+  TileRenderer(const SeenThrough& seen, const PictureShadows& shadows, unsigned sun_rays,
+               const Sky& sky, Lighting& lighting, Film& film)
+      : seen_(seen),
+        casters_(shadows),
+        sun_rays_(sun_rays),
+        sky_(sky),
+        lighting_(lighting),
+        film_(film) {}
+
+  /// Adds all samples to the film.
+  /// @param progress  advances by one for each sample
+  /// @throws as Lighting::shade()
+  void render_all(Progress& progress);
+
+ private:
+  /// A rectangle of pixels.
+  struct Tile {
+    unsigned x0, y0, width, height;
+    [[nodiscard]] std::size_t pixels() const { return std::size_t{width} * height; }
+  };
+
+  void render(const Tile& tile, unsigned first, unsigned count, Progress& progress);
+  void find_hits(const Tile& tile, unsigned first, unsigned count);
+  [[nodiscard]] std::span<const float> find_shadows();
+  void expose(const Tile& tile, unsigned first, const LitReceivers& lit);
+
+  SeenThrough seen_;
+  const PictureShadows& casters_;
+  unsigned sun_rays_;
+  const Sky& sky_;
+  Lighting& lighting_;
+  Film& film_;
+  std::vector<std::optional<PrimaryHit>> hits_;
+  std::vector<Receiver> receivers_;
+  std::vector<float> shadows_;
+  std::uint64_t seed_ = 0;  ///< hits whose shadows were found
+};
+
+}  // namespace ptc
