@@ -27,6 +27,7 @@ std::vector<LightRig> rigs_of_groups(const LightRig& rig, std::span<const std::s
     if (std::ranges::find(before, group) != before.end())
       throw RequestError("shadows", fmt::format("the group '{}' is named twice", group));
     rigs.push_back(only_group(rig, group == kRestGroup ? std::string() : group));
+    rigs.back().sky = {};
     if (group.empty() || !has_lamps(rigs.back())) {
       throw RequestError("shadows",
                          fmt::format("no sun, point or spot light of the scene is in the "

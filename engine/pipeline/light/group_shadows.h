@@ -18,7 +18,7 @@
 
 namespace ptc {
 
-/// Returns the lights of each group, with those of all others switched off.
+/// Returns the suns, point and spot lights of each group, with those of all others switched off.
 /// @param groups  kRestGroup stands for the lights in no group
 /// @throws RequestError when a group has no sun, point or spot light that shines, or is named twice
 [[nodiscard]] std::vector<LightRig> rigs_of_groups(const LightRig& rig,
