@@ -129,7 +129,7 @@ TEST_CASE("camera: it sees the back of a disc however near", "[trace][camera]") 
 
 TEST_CASE("camera: so it does among discs of all sizes, turned at random", "[trace][camera]") {
   const Scene scene(wild_scene());
-  // Of discs at one place it sees the first, which load_surfels() has first, too
+  // A camera sees the first of discs at one place, and load_surfels() keeps their order
   const std::vector<Surfel> surfels = load_surfels(*scene.container, 1'000'000);
   check_tile(scene, surfels, Eye({3, 1, 2}, {0, 0, 0}, 0.7F), 0.6);
   check_tile(scene, surfels, Eye({0, 0, 0}, {1, 0.2, 0.1}, 2), 0.6);

@@ -59,7 +59,7 @@ TEST_CASE("lobe: means over its directions are integrals over the hemisphere", "
         }
       }
       const double step = 2 * std::numbers::pi / kSteps / kSteps;
-      // The same by directions
+      // Sum up the same integrals over the directions of a lobe
       LobeRays lobe;
       lobe_directions(normal, eye, roughness, 16384, 5, lobe);
       double drawn = 0;

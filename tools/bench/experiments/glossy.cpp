@@ -10,6 +10,7 @@
 
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/mirror_rays.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/ptc.h"
 #include "engine/shade/reference/brute_force.h"
@@ -41,10 +42,6 @@ void reflect_by_embree(const DiscRays& discs, std::span<const Receiver> receiver
       results[i] = sum_lobe(lobe, hits, sky_at);
     }
   });
-}
-
-Shading as_shading(const Reflection& r) {
-  return {.occlusion = r.occlusion, .irradiance = r.radiance};
 }
 
 }  // namespace
@@ -89,6 +86,8 @@ std::vector<GlossyRow> measure_glossy(const SceneChoice& choice, const GlossyOpt
     reflect_by_embree(discs, some, how, 2'000'000'000, executor, b);
     progress.end();
 
+    const std::vector<Shading> first = as_shading(a), second = as_shading(b);
+
     // Trace by both in turn
     const std::size_t count = options.rays.size();
     std::vector<Costs> costs(2 * count);
@@ -112,9 +111,10 @@ std::vector<GlossyRow> measure_glossy(const SceneChoice& choice, const GlossyOpt
 
     // Compare with the reference
     for (std::size_t k = 0; k < 2 * count; ++k) {
+      const std::vector<Shading> ours = as_shading(results[k]);
       ErrorSums sums;
       for (std::size_t i = 0; i < checked.size(); ++i)
-        sums.add(as_shading(results[k][checked[i]]), as_shading(a[i]), as_shading(b[i]));
+        sums.add(ours[checked[i]], first[i], second[i]);
       const CheckError error = sums.error();
       rows.push_back({.scene = scene.name(),
                       .method = k < count ? "ptcx" : "embree-discs",

@@ -4,7 +4,8 @@
 //     |                                                   +--> errors, FLIP, a sheet of pictures
 //     `----> trace_paths() in two halves -------> paths --+
 //
-// Both take the same rays through each pixel, so that edges look alike and what differs is light.
+// The renderer and the path tracer take the same rays through each pixel, so that edges look alike
+// and what differs is light.
 #include "tools/bench/experiments/rooms.h"
 
 #include <algorithm>
