@@ -164,7 +164,7 @@ ordered_json facts_of(const GatherCounts& counts) {
   return {{"receivers", counts.receivers}, {"cells", counts.cells},
           {"groups", counts.groups},       {"surfel_blocks", counts.surfel_blocks},
           {"clusters", counts.clusters},   {"surfels", counts.surfels},
-          {"retests", counts.retests}};
+          {"retests", counts.retests},     {"rays", counts.rays}};
 }
 
 ordered_json facts_of(const StageSeconds& seconds) {

@@ -47,12 +47,12 @@ void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
   if (rays) budget.charge("rays at the mesh", rays->bytes());
 }
 
-std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene, unsigned threads,
-                               BackEnd back_end) {
+std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene, unsigned gathers,
+                               unsigned readers, BackEnd back_end) {
   charge_directory(budget, scene);
-  budget.charge("threads that gather", threads * kGatherBytes);
+  budget.charge("threads that gather", gathers * kGatherBytes);
   return budget.rest("the page cache",
-                     std::max(kMinCacheBytes, PageCache::min_bytes(scene, threads, back_end)));
+                     std::max(kMinCacheBytes, PageCache::min_bytes(scene, readers, back_end)));
 }
 
 }  // namespace ptc

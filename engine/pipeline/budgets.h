@@ -32,11 +32,13 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container);
 /// @param rays  the ray scene of the mesh; null when the mesh is not traced
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays);
 
-/// Charges a gather from `scene` on `threads` threads.
-/// @param budget  a copy: the caller's budget stays as it is
+/// Charges gathers from `scene`.
+/// @param budget   a copy: the caller's budget stays as it is
+/// @param gathers  that exist at once
+/// @param readers  of the page cache that exist at once, at least one for each gather
 /// @return        bytes that are left for the page cache of the gather
 /// @throws LimitError when these are too few for a cache; the text names the least cap that works
 [[nodiscard]] std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene,
-                                             unsigned threads, BackEnd back_end);
+                                             unsigned gathers, unsigned readers, BackEnd back_end);
 
 }  // namespace ptc

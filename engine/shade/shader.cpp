@@ -9,9 +9,10 @@ namespace {
 
 std::unique_ptr<PageCache> make_cache(const ContainerReader& container, const ShadeOptions& options,
                                       const Executor& executor) {
-  return std::make_unique<PageCache>(container, CacheOptions{.memory_bytes = options.cache_bytes,
-                                                             .threads = executor.threads(),
-                                                             .back_end = options.back_end});
+  return std::make_unique<PageCache>(container,
+                                     CacheOptions{.memory_bytes = options.cache_bytes,
+                                                  .threads = executor.threads() * options.readers(),
+                                                  .back_end = options.back_end});
 }
 
 }  // namespace
@@ -21,6 +22,7 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
     : executor_(executor),
       view_(container, options.lost),
       options_(options.gather),
+      visibility_(options.visibility),
       own_cache_(options.cache ? nullptr : make_cache(container, options, executor)),
       cache_(options.cache ? *options.cache : *own_cache_),
       gathers_(executor.threads()) {
@@ -30,7 +32,10 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
 }
 
 Gather& Shader::gather(unsigned thread) {
-  if (!gathers_[thread]) gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_);
+  if (!gathers_[thread]) {
+    gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_,
+                                                visibility_ ? visibility_(view_, cache_) : nullptr);
+  }
   return *gathers_[thread];
 }
 

@@ -23,15 +23,21 @@ struct ShadeOptions {
   /// The radiance that arrives from a direction (unit vector) where nothing covers it, W / (m^2
   /// sr); empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
-  /// A cache that the shader reads through, made for as many threads; it must outlive the shader.
+  /// A cache that the shader reads through, made for readers() of each thread; it must outlive the
+  /// shader.
   /// With null the shader makes its own.
   PageCache* cache = nullptr;
+  /// Makes the rays through small openings of each gather; empty: the sky is as it is drawn.
+  VisibilityMaker visibility;
   /// The place where damaged pages are noted, which shading then passes over; it must outlive the
   /// shader. With null, damaged pages are errors.
   LostPages* lost = nullptr;
   /// How many variants there are to choose from. Each turns the direction cube and shifts the
   /// receiver cells in another way.
   unsigned variants = 1;
+
+  /// Returns how many readers of the cache a thread of a shader needs.
+  [[nodiscard]] unsigned readers() const noexcept { return visibility ? 2 : 1; }
 };
 
 /// Shades receivers block by block, and keeps the page cache and the gathers between calls.
@@ -73,6 +79,7 @@ class Shader {
   SceneView view_;
   std::vector<std::unique_ptr<DirectionGrid>> grids_;  ///< by variant
   GatherOptions options_;
+  VisibilityMaker visibility_;
   std::unique_ptr<PageCache> own_cache_;
   PageCache& cache_;
   std::vector<std::unique_ptr<Gather>> gathers_;  ///< by thread, made when first needed

@@ -143,6 +143,7 @@ struct GatherCounts {
   std::uint64_t clusters = 0;       ///< clusters that were drawn
   std::uint64_t surfels = 0;        ///< surfels that were drawn
   std::uint64_t retests = 0;  ///< clusters and surfels that one cell left and a cell in it tested
+  std::uint64_t rays = 0;     ///< rays at the borders of small openings
   DamageCounts damage;        ///< what was drawn in place of lost pages
 
   /// Adds the counts of another gather.

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 #include <span>
+#include <vector>
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
@@ -356,4 +357,22 @@ TEST_CASE("direction buffer: a resolution that the pixel loops cannot take is re
   for (const unsigned resolution : {0U, 8U, 24U, 80U})
     CHECK_THROWS_AS(DirectionGrid(resolution, {}), std::invalid_argument);
   for (const unsigned resolution : {16U, 48U, 64U}) CHECK_NOTHROW(DirectionGrid(resolution, {}));
+}
+
+TEST_CASE("direction buffer: the sky is not negative where a border moves over all that is open",
+          "[shade][buffer]") {
+  // A slit between a disc at the distance 1 and one at 100. To the receiver, which lies aside of
+  // the viewpoint, the near one covers the slit and more; what lies beside does not count.
+  const DirectionGrid grid(32, [](const glm::vec3&) { return glm::vec3(1); });
+  DirectionBuffer buffer(32);
+  DiscQueue queue;
+  queue.push({-5, 0, 1}, {0, 0, -1}, 5, 0);
+  queue.push({510, 0, 100}, {0, 0, -1}, 500, 0);
+  buffer.draw(grid, queue, Sides::both);
+  const PixelWeights cone{.cone_cos = std::cos(0.4F)};
+  CHECK(buffer.resolve(grid, {0, 0, 1}, {}, &cone).sky.g > 0);
+  const std::vector<glm::vec3> offsets{{-0.2F, 0, 0}};
+  const Shading moved = buffer.resolve(grid, {0, 0, 1}, offsets, &cone);
+  CHECK(moved.occlusion == 1);
+  CHECK(moved.sky == glm::vec3(0));
 }

@@ -31,6 +31,7 @@
 #include "engine/store/commit.h"
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
+#include "engine/trace/disc_visibility.h"
 #include "format/scalar.h"
 
 namespace ptc {
@@ -245,14 +246,16 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                   executor.threads() * DiscLight::thread_bytes(rig, request.light_sampling));
   }
   budget.require();
-  const unsigned readers = executor.threads() * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
+  const unsigned lights_at_once = executor.threads() * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
+  const unsigned readers = lights_at_once + (sky ? executor.threads() : 0);
   std::unique_ptr<PageCache> cache;
   if (readers > 0) {
     cache = std::make_unique<PageCache>(
-        scene, CacheOptions{.memory_bytes = cache_bytes_left(std::move(budget), scene, readers,
-                                                             request.back_end),
-                            .threads = readers,
-                            .back_end = request.back_end});
+        scene,
+        CacheOptions{.memory_bytes = cache_bytes_left(std::move(budget), scene, lights_at_once,
+                                                      readers, request.back_end),
+                     .threads = readers,
+                     .back_end = request.back_end});
   }
 
   const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],
@@ -272,6 +275,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   }
   if (sky) {
     ShadeOptions shade{.gather = request.gather, .sky = sky, .cache = cache.get()};
+    shade.visibility = disc_visibility(request.gather.sides);
     shade.gather.bleeding = false;
     shader = std::make_unique<Shader>(scene, shade, executor);
   }

@@ -18,6 +18,7 @@
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/bounces.h"
+#include "engine/trace/disc_visibility.h"
 
 namespace ptc {
 namespace {
@@ -142,7 +143,6 @@ Lighting::~Lighting() = default;
 void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
                        const glm::dvec3& eye, const std::filesystem::path& target) {
   charge_bounces(budget, scene_, request_.bounces, executor_.threads());
-  const unsigned readers = readers_of(executor_, request_.estimate);
   if (request_.glossy.roughness) {
     mirrors_ = {.eye = eye,
                 .roughness = *request_.glossy.roughness,
@@ -152,13 +152,15 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
                     executor_.threads() * RayShader::kRayBytes * most_rays;
     budget.charge("rays of mirrors", mirror_bytes_);
   }
-  options_ = {
-      .cache_bytes = cache_bytes_left(std::move(budget), scene_, readers, request_.back_end),
-      .back_end = request_.back_end,
-      .gather = request_.gather,
-      .sky = sky_function(sky),
-      .lost = lost_.get(),
-      .variants = variants};
+  options_ = {.back_end = request_.back_end,
+              .gather = request_.gather,
+              .sky = sky_function(sky),
+              .lost = lost_.get(),
+              .variants = variants};
+  if (options_.sky) options_.visibility = disc_visibility(request_.gather.sides);
+  options_.cache_bytes =
+      cache_bytes_left(std::move(budget), scene_, (request_.estimate ? 2 : 1) * executor_.threads(),
+                       readers_of(executor_, options_, request_.estimate), request_.back_end);
   if (Surroundings& around = options_.gather.around; around.diagonals > 0) {
     around.distance = around.diagonals * static_cast<float>(diagonal_of(scene_));
     around.diagonals = 0;
@@ -221,8 +223,8 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
   } else {
     if (request_.glossy.roughness) {
       // Mirrors take a quarter of what a gather can spare
-      const std::uint64_t least =
-          PageCache::min_bytes(scene_, readers_of(executor_, request_.estimate), request_.back_end);
+      const std::uint64_t least = PageCache::min_bytes(
+          scene_, readers_of(executor_, options_, request_.estimate), request_.back_end);
       const std::uint64_t share = estimator_ ? 0 : (options_.cache_bytes - least) / 4;
       options_.cache_bytes -= share;
       with.memory_bytes = mirror_bytes_ + share;

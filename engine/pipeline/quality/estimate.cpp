@@ -207,11 +207,13 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
                      std::span<const Pilot> pilots, std::span<const Shading> traced,
                      const Executor& executor)
     : options_(options),
-      cache_(std::make_unique<PageCache>(scene, CacheOptions{.memory_bytes = options.cache_bytes,
-                                                             .threads = readers_of(executor, true),
-                                                             .back_end = options.back_end})) {
+      cache_(std::make_unique<PageCache>(
+          scene, CacheOptions{.memory_bytes = options.cache_bytes,
+                              .threads = readers_of(executor, options, true),
+                              .back_end = options.back_end})) {
   options_.cache = cache_.get();
   options_.sky = {};  // the sky is not estimated
+  options_.visibility = {};
   options_.variants = std::max(2U, options.variants);
   report_.pilots = traced.size() / 2;
   const double before = cpu_seconds();

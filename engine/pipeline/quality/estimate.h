@@ -79,10 +79,12 @@ struct EstimateCheck {
   EstimateWorth occlusion, irradiance;
 };
 
-/// Returns the number of gathers that a run has at once, each with a reader of the page cache.
-/// @param estimate  every receiver is shaded twice, to estimate its error
-[[nodiscard]] inline unsigned readers_of(const Executor& executor, bool estimate) {
-  return (estimate ? 2 : 1) * executor.threads();
+/// Returns the number of readers of the page cache that a run has at once.
+/// @param options   of the run
+/// @param estimate  every receiver is shaded once more, to estimate its error
+[[nodiscard]] inline unsigned readers_of(const Executor& executor, const ShadeOptions& options,
+                                         bool estimate) {
+  return (options.readers() + (estimate ? 1 : 0)) * executor.threads();
 }
 
 /// Traces rays at the compared receivers of the pilots, for a run whose settings tune() does not

@@ -104,9 +104,10 @@ class Tuner {
   /// Gives the memory of the rays, which are gone, to a page cache.
   void begin_shading() {
     return_freed_memory();
-    cache_ = std::make_unique<PageCache>(scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
-                                                              .threads = executor_.threads(),
-                                                              .back_end = options_.back_end});
+    cache_ = std::make_unique<PageCache>(
+        scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
+                             .threads = executor_.threads() * options_.readers(),
+                             .back_end = options_.back_end});
   }
 
   /// Returns the cheapest rung that meets `asked` at the choosing and at the confirming pilots; the
@@ -228,12 +229,16 @@ class Tuner {
     const SceneView view(scene_);
     std::vector<std::unique_ptr<DirectionGrid>> grids;
     for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
-      grids.push_back(std::make_unique<DirectionGrid>(gather.resolution, nullptr, i));
+      grids.push_back(std::make_unique<DirectionGrid>(gather.resolution, options_.sky, i));
     }
     std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
     std::vector<ErrorSums> errors((pilots_.size() + 1 - part) / 2);
     executor_.for_each(errors.size(), [&](std::size_t i, unsigned thread) {
-      if (!gathers[thread]) gathers[thread] = std::make_unique<Gather>(view, *cache_, gather);
+      if (!gathers[thread]) {
+        gathers[thread] = std::make_unique<Gather>(
+            view, *cache_, gather,
+            options_.visibility ? options_.visibility(view, *cache_) : nullptr);
+      }
       const std::size_t index = 2 * i + part;
       const Pilot& pilot = pilots_[index];
       std::vector<Shading> results(pilot.receivers.size());
@@ -253,7 +258,8 @@ class Tuner {
     const GatherCounts& counts = counts_[rung];
     const double side = ladder()[rung].resolution / 16.0;
     const double sum = kBlockCost * static_cast<double>(counts.surfel_blocks) +
-                       kClusterCost * static_cast<double>(counts.clusters);
+                       kClusterCost * static_cast<double>(counts.clusters) +
+                       kRayCost * static_cast<double>(counts.rays);
     return sum / static_cast<double>(std::max<std::uint64_t>(1, counts.receivers)) +
            kPixelsCost * side * side;
   }

@@ -19,6 +19,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
@@ -125,6 +126,12 @@ DirectionGrid::DirectionGrid(unsigned resolution,
   }
 }
 
+glm::vec3 DirectionGrid::sky(std::size_t pixel) const {
+  const std::size_t plane = weight_.size();
+  const float* at = sky_.data() + pixel / plane * 3 * plane + pixel % plane;
+  return {at[0], at[plane], at[2 * plane]};
+}
+
 DirectionBuffer::DirectionBuffer(unsigned resolution, bool coloured)
     : nearness_(std::size_t{6} * resolution * resolution + std::size_t{4} * resolution, 0),
       rgbe_(coloured ? nearness_.size() : 0, 0) {}
@@ -161,10 +168,10 @@ Shading DirectionBuffer::resolve(const DirectionGrid& grid, const glm::vec3& nor
              offsets.empty() ? nullptr : &turned, weights, sums);
   // Divide by the sum of all weights instead of pi, so that an empty cube gives exactly 0.
   Shading shading;
-  // Borders of pixels that move can leave a little less than nothing covered
+  // Borders of pixels that move can leave a little less than nothing
   shading.occlusion = std::clamp(sums.covered / sums.total, 0.0F, 1.0F);
-  shading.irradiance = sums.light * (kPi / sums.total);
-  shading.sky = sums.sky * (kPi / sums.total);
+  shading.irradiance = glm::max(glm::vec3(0), sums.light * (kPi / sums.total));
+  shading.sky = glm::max(glm::vec3(0), sums.sky * (kPi / sums.total));
   const float length = glm::length(sums.open);
   shading.bent_normal = length > 0 ? glm::transpose(rotation) * (sums.open / length) : normal;
   return shading;

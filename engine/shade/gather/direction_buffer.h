@@ -46,6 +46,13 @@ class DirectionGrid {
   [[nodiscard]] unsigned variant() const noexcept { return variant_; }
   /// Returns the rotation from the world to the axes of the cube.
   [[nodiscard]] const glm::mat3& rotation() const noexcept { return geometry_.rotation; }
+  /// Returns the pixels.
+  [[nodiscard]] const CubeGeometry& geometry() const noexcept { return geometry_; }
+  /// Says whether there is a sky.
+  [[nodiscard]] bool has_sky() const noexcept { return !sky_.empty(); }
+  /// Returns the mean radiance of the sky in a pixel, W/(m^2 sr). There must be a sky.
+  /// @param pixel  by face, row and column
+  [[nodiscard]] glm::vec3 sky(std::size_t pixel) const;
 
  private:
   friend class DirectionBuffer;
@@ -100,6 +107,8 @@ class DirectionBuffer {
   [[nodiscard]] Shading resolve(const DirectionGrid& grid, const glm::vec3& normal,
                                 std::span<const glm::vec3> offsets = {},
                                 const PixelWeights* weights = nullptr) const noexcept;
+  /// Returns CubePixels::nearness.
+  [[nodiscard]] std::span<const float> nearness() const noexcept { return nearness_; }
 
  private:
   std::vector<float> nearness_;      ///< CubePixels::nearness

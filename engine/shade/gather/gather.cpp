@@ -38,14 +38,18 @@ void split(std::span<const PlacedReceiver> cell, const Body& body) {
 
 }  // namespace
 
-Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& options)
+Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
+               std::unique_ptr<Visibility> visibility)
     : scene_(view, cache),
       options_(options),
       empty_(options.resolution, options.bleeding),
       leaf_(options.resolution, options.bleeding) {
   empty_.clear();
   const Surroundings& around = options.around;
-  if (around.is_plain()) return;
+  if (around.is_plain()) {
+    if (visibility) openings_.emplace(std::move(visibility));
+    return;
+  }
   weights_.emplace(PixelWeights{.sphere = around.sphere,
                                 .cone_cos = std::max(0.0F, std::cos(around.cone)),
                                 .falloff = around.falloff});
@@ -57,6 +61,8 @@ void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> resul
                    const DirectionGrid& grid) {
   if (receivers.empty()) return;
   grid_ = &grid;
+  given_ = receivers;
+  if (openings_) openings_->forget();
   place(receivers);
   results_ = results;
   payloads_.clear();
@@ -126,8 +132,12 @@ void Gather::resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer
     for (std::size_t i = 0; i < depth; ++i) {
       offsets[i] = glm::vec3((receiver.position - levels_[i]->centre) * SceneScale::kLatticeUnit);
     }
-    results_[receiver.index] = drawn.resolve(
-        *grid_, receiver.normal, std::span(offsets).first(depth), weights_ ? &*weights_ : nullptr);
+    Shading& result = results_[receiver.index];
+    result = drawn.resolve(*grid_, receiver.normal, std::span(offsets).first(depth),
+                           weights_ ? &*weights_ : nullptr);
+    // Rays would pass through what stand-ins cover
+    if (openings_ && grid_->has_sky() && bound == 0)
+      counts_.rays += openings_->mend(*grid_, drawn, given_[receiver.index], result);
   }
   counts_.receivers += cell.size();
   if (bound > 0) counts_.damage.add(cell.size(), std::min(1.0F, bound));
@@ -260,6 +270,7 @@ void GatherCounts::add(const GatherCounts& other) noexcept {
   clusters += other.clusters;
   surfels += other.surfels;
   retests += other.retests;
+  rays += other.rays;
   damage.add(other.damage);
 }
 

@@ -12,6 +12,7 @@
 
 #include "engine/shade/gather/direction_buffer.h"
 #include "engine/shade/gather/near_lists.h"
+#include "engine/shade/gather/openings.h"
 #include "engine/shade/gather/receiver_cell.h"
 #include "engine/shade/gather/scene_view.h"
 #include "engine/shade/kernels/disc_queue.h"
@@ -31,8 +32,11 @@ namespace ptc {
 /// lists.
 class Gather {
  public:
-  /// @param view   must outlive the gather, as must the cache
-  Gather(const SceneView& view, PageCache& cache, const GatherOptions& options);
+  /// @param view        must outlive the gather, as must the cache
+  /// @param visibility  finds the sky through small openings, where the whole hemisphere counts;
+  ///                    null: the sky stays as it is drawn
+  Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
+         std::unique_ptr<Visibility> visibility = nullptr);
 
   /// Shades receivers.
   /// @param receivers  neighbours, in any order; a few thousand at once share best
@@ -77,6 +81,7 @@ class Gather {
   const DirectionGrid* grid_ = nullptr;  ///< of the current call
   GatherCounts counts_;
   std::vector<PlacedReceiver> receivers_;       ///< of the current call, along the Z-curve
+  std::span<const Receiver> given_;             ///< of the current call, in the caller's order
   std::span<Shading> results_;                  ///< of the current call
   std::vector<std::unique_ptr<Level>> levels_;  ///< by depth, made when first needed
   std::vector<ClusterPayload>
@@ -85,6 +90,7 @@ class Gather {
   std::vector<std::uint32_t> opened_;  ///< indices into payloads_ of clusters to open
   DirectionBuffer empty_, leaf_;
   DiscQueue queue_;
+  std::optional<Openings> openings_;
 };
 
 }  // namespace ptc

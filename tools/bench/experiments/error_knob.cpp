@@ -100,9 +100,9 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const ContainerReader container(scene.path());
   const ThreadPool executor(run.threads);
   errors.surfels = container.superblock().points;
-  const ShadeOptions settings{.cache_bytes =
-                                  cache_bytes_left(budget_of(run.memory_bytes, "the ladder"),
-                                                   container, executor.threads(), BackEnd::pread)};
+  const ShadeOptions settings{
+      .cache_bytes = cache_bytes_left(budget_of(run.memory_bytes, "the ladder"), container,
+                                      executor.threads(), executor.threads(), BackEnd::pread)};
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);
