@@ -36,12 +36,31 @@ float fall(float from, float to, float x) {
 
 }  // namespace
 
+// Numbers the pixels of each face along a Z-curve.
+void Openings::place_pixels(std::uint32_t side) {
+  if (places_.size() == std::size_t{6} * side * side) return;
+  places_.clear();
+  for (std::uint32_t i = 0; i < 6 * side * side; ++i) {
+    const std::uint32_t face = i / (side * side), x = i % side, y = i / side % side;
+    std::uint32_t along = face;
+    for (std::uint32_t bit = std::bit_ceil(side) / 2; bit > 0; bit /= 2)
+      along = along << 2 | ((y & bit) != 0 ? 2U : 0U) | ((x & bit) != 0 ? 1U : 0U);
+    places_.push_back({.along = static_cast<std::uint16_t>(along),
+                       .face = static_cast<std::uint8_t>(face),
+                       .x = static_cast<std::uint8_t>(x),
+                       .y = static_cast<std::uint8_t>(y)});
+  }
+  state_.assign(places_.size(), kUnseen);
+}
+
 /// The pixels of a cube, by face, row and column, as a receiver sees them.
 class Openings::Hemisphere {
  public:
-  Hemisphere(const DirectionGrid& grid, const Receiver& receiver)
+  /// @param places  of the pixels of the grid
+  Hemisphere(const DirectionGrid& grid, const Receiver& receiver, std::span<const Place> places)
       : grid_(grid),
         receiver_(receiver),
+        places_(places),
         to_world_(glm::transpose(grid.rotation())),
         normal_(grid.rotation() * receiver.normal),
         side_(grid.resolution()),
@@ -55,7 +74,6 @@ class Openings::Hemisphere {
   [[nodiscard]] const Receiver& receiver() const { return receiver_; }
   [[nodiscard]] const glm::mat3& to_world() const { return to_world_; }
   [[nodiscard]] std::uint32_t side() const { return side_; }
-  [[nodiscard]] std::uint32_t pixels() const { return 6 * side_ * side_; }
   /// Returns the points of a pixel, 0 to 1 along its edges.
   [[nodiscard]] SquarePoints points(std::uint32_t pixel) const {
     return SquarePoints(seed_ + pixel);
@@ -64,15 +82,69 @@ class Openings::Hemisphere {
   /// other pixels.
   /// @param x, y  0 to 1 within the pixel
   [[nodiscard]] glm::vec3 direction(std::uint32_t pixel, float x, float y) const {
-    const std::uint32_t face = pixel / (side_ * side_);
-    const CubeFace axes(static_cast<int>(face));
+    const Place& place = places_[pixel];
+    return direction(CubeFace(place.face), coordinate(place.x, x), coordinate(place.y, y));
+  }
+  /// Returns the height over the horizon of a direction, in its own length.
+  [[nodiscard]] float height(const glm::vec3& d) const { return glm::dot(d, normal_); }
+  /// Returns the height of the middle of a pixel.
+  [[nodiscard]] float height(std::uint32_t pixel) const {
+    return height(direction(pixel, 0.5F, 0.5F));
+  }
+  /// Says whether part of a pixel may lie above the horizon.
+  /// @param middle  height of its middle
+  [[nodiscard]] bool may_see(float middle) const { return middle > -step_; }
+  /// Returns the weight of a pixel that has the density of one of its directions (1, u, v), sr:
+  /// its area on the face times the cosine to the normal, over |(1, u, v)|^3.
+  [[nodiscard]] float weight(const glm::vec3& d) const {
+    const float length2 = glm::dot(d, d);
+    return step_ * step_ * height(d) / (length2 * length2);
+  }
+
+  /// Calls body(pixel) for the pixels around one, also across the edges of the cube.
+  template <class Body>
+  void for_each_around(std::uint32_t pixel, const Body& body) const {
+    const Place& place = places_[pixel];
+    const bool inside = place.x > 0 && place.y > 0 && place.x + 1U < side_ && place.y + 1U < side_;
+    for (std::uint32_t k = 0; k < 9; ++k) {
+      if (k == 4) continue;
+      if (inside) {
+        body(pixel + (k / 3) * side_ + k % 3 - side_ - 1);
+      } else {
+        body(pixel_at(
+            direction(pixel, static_cast<float>(k % 3) - 0.5F, static_cast<float>(k / 3) - 0.5F)));
+      }
+    }
+  }
+  /// Calls body(pixel) for each pixel that may see something and that nothing covers.
+  template <class Body>
+  void for_each_open(std::span<const float> nearness, const Body& body) const {
+    for (std::uint32_t face = 0; face < 6; ++face) {
+      const CubeFace axes(static_cast<int>(face));
+      for (std::uint32_t y = 0; y < side_; ++y) {
+        const std::uint32_t first = (face * side_ + y) * side_;
+        const float slope = normal_[axes.u], row = height(direction(axes, 0, coordinate(y, 0.5F)));
+        if (!may_see(row + std::abs(slope))) continue;
+        for (std::uint32_t x = 0; x < side_; ++x) {
+          if (nearness[first + x] == 0 && may_see(row + slope * coordinate(x, 0.5F)))
+            body(first + x);
+        }
+      }
+    }
+  }
+
+ private:
+  /// Returns u or v at a place of a column or row.
+  [[nodiscard]] float coordinate(std::uint32_t at, float within) const {
+    return (static_cast<float>(at) + within) * step_ - 1;
+  }
+  [[nodiscard]] static glm::vec3 direction(const CubeFace& axes, float u, float v) {
     glm::vec3 d;
     d[axes.w] = axes.sign;
-    d[axes.u] = (static_cast<float>(pixel % side_) + x) * step_ - 1;
-    d[axes.v] = (static_cast<float>(pixel / side_ % side_) + y) * step_ - 1;
+    d[axes.u] = u;
+    d[axes.v] = v;
     return d;
   }
-  [[nodiscard]] glm::vec3 middle(std::uint32_t pixel) const { return direction(pixel, 0.5F, 0.5F); }
   /// Returns the pixel that a direction of any length leads to.
   [[nodiscard]] std::uint32_t pixel_at(const glm::vec3& d) const {
     const glm::vec3 size = glm::abs(d);
@@ -84,29 +156,10 @@ class Openings::Hemisphere {
     };
     return (static_cast<std::uint32_t>(face) * side_ + place(axes.v)) * side_ + place(axes.u);
   }
-  /// Calls body(pixel, direction of its middle) for a pixel and those around it.
-  template <class Body>
-  void for_each_around(std::uint32_t pixel, const Body& body) const {
-    for (int k = 0; k < 9; ++k) {
-      const glm::vec3 d =
-          direction(pixel, static_cast<float>(k % 3) - 0.5F, static_cast<float>(k / 3) - 0.5F);
-      body(pixel_at(d), d);
-    }
-  }
-  /// Returns the height of a direction over the horizon, in its own length.
-  [[nodiscard]] float height(const glm::vec3& d) const { return glm::dot(d, normal_); }
-  /// Says whether part of a pixel may lie above the horizon. @param middle  its direction
-  [[nodiscard]] bool may_see(const glm::vec3& middle) const { return height(middle) > -step_; }
-  /// Returns the weight of a pixel that has the density of one of its directions (1, u, v), sr:
-  /// its area on the face times the cosine to the normal, over |(1, u, v)|^3.
-  [[nodiscard]] float weight(const glm::vec3& d) const {
-    const float length2 = glm::dot(d, d);
-    return step_ * step_ * height(d) / (length2 * length2);
-  }
 
- private:
   const DirectionGrid& grid_;
   const Receiver& receiver_;
+  std::span<const Place> places_;
   glm::mat3 to_world_;
   glm::vec3 normal_;
   std::uint32_t side_;
@@ -114,8 +167,8 @@ class Openings::Hemisphere {
   std::uint64_t seed_;
 };
 
-void Openings::visit(const Hemisphere& above, std::uint32_t pixel, const glm::vec3& middle) {
-  if (state_[pixel] != kUnseen || !above.may_see(middle)) return;
+void Openings::visit(const Hemisphere& above, std::uint32_t pixel) {
+  if (state_[pixel] != kUnseen || !above.may_see(above.height(pixel))) return;
   state_[pixel] = kCovered;
   seen_.push_back(pixel);
 }
@@ -124,26 +177,28 @@ void Openings::visit(const Hemisphere& above, std::uint32_t pixel, const glm::ve
 // is an opening, 0 to 1.
 float Openings::begin(const Hemisphere& above, std::span<const float> nearness) {
   const std::uint32_t side = above.side();
-  state_.resize(above.pixels(), kUnseen);
   unsigned squares = 0;
-  for (std::uint32_t i = 0; i < above.pixels(); ++i) {
-    if (nearness[i] != 0) continue;
-    const glm::vec3 middle = above.middle(i);
-    visit(above, i, middle);
-    if (!(above.height(middle) > 0) || i % side + 1 == side || i / side % side + 1 == side)
-      continue;
-    if (nearness[i + 1] == 0 && nearness[i + side] == 0 && nearness[i + side + 1] == 0) ++squares;
-  }
+  above.for_each_open(nearness, [&](std::uint32_t i) {
+    visit(above, i);
+    if (places_[i].x + 1U == side || places_[i].y + 1U == side) return;
+    if (nearness[i + 1] == 0 && nearness[i + side] == 0 && nearness[i + side + 1] == 0 &&
+        above.height(i) > 0)
+      ++squares;
+  });
   const float opening = last_.empty() ? 1 - fall(kChink, kOpening, static_cast<float>(squares)) : 1;
-  for (const std::uint32_t i : last_) visit(above, i, above.middle(i));
+  for (const std::uint32_t i : last_) visit(above, i);
   return opening;
 }
 
 // Sends the rays `first` to `end` of each pixel of the wave, and marks pixels that are open.
 void Openings::look(const Hemisphere& above, std::uint32_t first, std::uint32_t end, Sums& sums) {
+  // Neighbours share a list of boxes
+  for (std::uint32_t& pixel : wave_) pixel |= std::uint32_t{places_[pixel].along} << 16;
+  std::ranges::sort(wave_);
   rays_.clear();
   directions_.clear();
-  for (const std::uint32_t pixel : wave_) {
+  for (std::uint32_t& pixel : wave_) {
+    pixel &= 0xFFFF;
     const SquarePoints points = above.points(pixel);
     for (std::uint32_t k = first; k < end; ++k) {
       const glm::vec2 at = points.square(k);
@@ -170,7 +225,7 @@ void Openings::look(const Hemisphere& above, std::uint32_t first, std::uint32_t 
 // Looks along one ray in each pixel that was visited, and goes on around those that are open. Says
 // whether it found an end.
 bool Openings::grow(const Hemisphere& above, Sums& sums) {
-  const auto most = static_cast<std::size_t>(kMost * static_cast<float>(above.pixels()));
+  const auto most = static_cast<std::size_t>(kMost * static_cast<float>(places_.size()));
   for (std::size_t done = 0; done < seen_.size();) {
     wave_.assign(seen_.begin() + static_cast<std::ptrdiff_t>(done), seen_.end());
     done = seen_.size();
@@ -178,8 +233,7 @@ bool Openings::grow(const Hemisphere& above, Sums& sums) {
     look(above, 0, 1, sums);
     for (const std::uint32_t i : wave_) {
       if (state_[i] != kOpen) continue;
-      above.for_each_around(
-          i, [&](std::uint32_t pixel, const glm::vec3& middle) { visit(above, pixel, middle); });
+      above.for_each_around(i, [&](std::uint32_t pixel) { visit(above, pixel); });
     }
   }
   return true;
@@ -188,7 +242,7 @@ bool Openings::grow(const Hemisphere& above, Sums& sums) {
 // Looks again, along more rays in each pixel in and around what is open, where these are few.
 void Openings::refine(const Hemisphere& above, Sums& sums) {
   for (const std::uint32_t i : last_) {
-    above.for_each_around(i, [&](std::uint32_t pixel, const glm::vec3&) {
+    above.for_each_around(i, [&](std::uint32_t pixel) {
       if (state_[pixel] == kCovered) state_[pixel] = kBorder;
     });
   }
@@ -213,9 +267,10 @@ std::size_t Openings::mend(const DirectionGrid& grid, const DirectionBuffer& dra
                            const Receiver& receiver, Shading& shading) {
   float share = fall(kLittleOpen, kMuchOpen, 1 - shading.occlusion);
   if (!(share > 0)) return 0;
-  const Hemisphere above(grid, receiver);
+  place_pixels(grid.resolution());
+  const Hemisphere above(grid, receiver, places_);
   share *= begin(above, drawn.nearness());
-  const auto pixels = static_cast<float>(above.pixels());
+  const auto pixels = static_cast<float>(places_.size());
   share *= fall(kFew * pixels, kMany * pixels, static_cast<float>(seen_.size()));
   if (!(share > 0)) {
     clear();

@@ -48,7 +48,7 @@ using VisibilityMaker =
 /// A receiver also begins with what was open to the one before, since what is close to it, such as
 /// a wall beside it, may hide all of the opening where it is drawn.
 ///
-/// Threads: one thread at a time.   Memory: 10 bytes for each pixel of a cube, 30 for each ray.
+/// Threads: one thread at a time.   Memory: 16 bytes for each pixel of a cube, 30 for each ray.
 class Openings {
  public:
   /// @param visibility  not null
@@ -67,6 +67,11 @@ class Openings {
 
  private:
   class Hemisphere;
+  /// Where a pixel lies.
+  struct Place {
+    std::uint16_t along;      ///< place along a curve on which neighbours lie close together
+    std::uint8_t face, x, y;  ///< face, column and row
+  };
   /// What is known of a pixel.
   enum State : std::uint8_t { kUnseen, kCovered, kBorder, kOpen };
   struct Ray {
@@ -80,14 +85,16 @@ class Openings {
     glm::vec3 towards{0};  ///< of weights times directions
   };
 
+  void place_pixels(std::uint32_t side);
   float begin(const Hemisphere& above, std::span<const float> nearness);
-  void visit(const Hemisphere& above, std::uint32_t pixel, const glm::vec3& middle);
+  void visit(const Hemisphere& above, std::uint32_t pixel);
   void look(const Hemisphere& above, std::uint32_t first, std::uint32_t end, Sums& sums);
   bool grow(const Hemisphere& above, Sums& sums);
   void refine(const Hemisphere& above, Sums& sums);
   void clear() noexcept;
 
   std::unique_ptr<Visibility> visibility_;
+  std::vector<Place> places_;        ///< by pixel
   std::vector<State> state_;         ///< by pixel; all kUnseen between calls
   std::vector<std::uint32_t> seen_;  ///< pixels that are not kUnseen
   std::vector<std::uint32_t> wave_;  ///< pixels to look at
