@@ -36,7 +36,7 @@ void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays);
 /// @param budget   a copy: the caller's budget stays as it is
 /// @param gathers  that exist at once
 /// @param readers  of the page cache that exist at once, at least one for each gather
-/// @return        bytes that are left for the page cache of the gather
+/// @return         bytes that are left for the page cache of the gather
 /// @throws LimitError when these are too few for a cache; the text names the least cap that works
 [[nodiscard]] std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene,
                                              unsigned gathers, unsigned readers, BackEnd back_end);

@@ -22,7 +22,7 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
     : executor_(executor),
       view_(container, options.lost),
       options_(options.gather),
-      visibility_(options.visibility),
+      visibility_(options.visibility_of_sky()),
       own_cache_(options.cache ? nullptr : make_cache(container, options, executor)),
       cache_(options.cache ? *options.cache : *own_cache_),
       gathers_(executor.threads()) {
@@ -32,10 +32,8 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
 }
 
 Gather& Shader::gather(unsigned thread) {
-  if (!gathers_[thread]) {
-    gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_,
-                                                visibility_ ? visibility_(view_, cache_) : nullptr);
-  }
+  if (!gathers_[thread])
+    gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_, visibility_);
   return *gathers_[thread];
 }
 

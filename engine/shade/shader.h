@@ -24,10 +24,10 @@ struct ShadeOptions {
   /// sr); empty: none.
   std::function<glm::vec3(const glm::vec3&)> sky;
   /// A cache that the shader reads through, made for readers() of each thread; it must outlive the
-  /// shader.
-  /// With null the shader makes its own.
+  /// shader. With null the shader makes its own.
   PageCache* cache = nullptr;
-  /// Makes the rays through small openings of each gather; empty: the sky is as it is drawn.
+  /// Makes the rays through small openings of each gather, where there is a sky; empty: the sky is
+  /// as it is drawn.
   VisibilityMaker visibility;
   /// The place where damaged pages are noted, which shading then passes over; it must outlive the
   /// shader. With null, damaged pages are errors.
@@ -36,8 +36,12 @@ struct ShadeOptions {
   /// receiver cells in another way.
   unsigned variants = 1;
 
+  /// Returns what a gather needs to find the sky through small openings; empty without a sky.
+  [[nodiscard]] VisibilityMaker visibility_of_sky() const {
+    return sky ? visibility : VisibilityMaker();
+  }
   /// Returns how many readers of the cache a thread of a shader needs.
-  [[nodiscard]] unsigned readers() const noexcept { return visibility ? 2 : 1; }
+  [[nodiscard]] unsigned readers() const { return visibility_of_sky() ? 2 : 1; }
 };
 
 /// Shades receivers block by block, and keeps the page cache and the gathers between calls.

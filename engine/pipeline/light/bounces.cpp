@@ -113,7 +113,6 @@ std::unique_ptr<ContainerReader> bounce_light(const ContainerReader& scene,
   // emitters which lit the points is in their radiance
   ShadeOptions shade = options.shade;
   shade.sky = {};
-  shade.visibility = {};
   shade.gather = coarser(shade.gather);
   shade.gather.emission = !lit_by_emitters(scene);
   shade.variants = 1;

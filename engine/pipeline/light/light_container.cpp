@@ -274,8 +274,10 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                                          request.gather.sides, executor);
   }
   if (sky) {
-    ShadeOptions shade{.gather = request.gather, .sky = sky, .cache = cache.get()};
-    shade.visibility = disc_visibility(request.gather.sides);
+    ShadeOptions shade{.gather = request.gather,
+                       .sky = sky,
+                       .cache = cache.get(),
+                       .visibility = disc_visibility(request.gather.sides)};
     shade.gather.bleeding = false;
     shader = std::make_unique<Shader>(scene, shade, executor);
   }

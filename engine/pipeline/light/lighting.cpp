@@ -155,9 +155,9 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
   options_ = {.back_end = request_.back_end,
               .gather = request_.gather,
               .sky = sky_function(sky),
+              .visibility = disc_visibility(request_.gather.sides),
               .lost = lost_.get(),
               .variants = variants};
-  if (options_.sky) options_.visibility = disc_visibility(request_.gather.sides);
   options_.cache_bytes =
       cache_bytes_left(std::move(budget), scene_, (request_.estimate ? 2 : 1) * executor_.threads(),
                        readers_of(executor_, options_, request_.estimate), request_.back_end);

@@ -213,7 +213,6 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
                               .back_end = options.back_end})) {
   options_.cache = cache_.get();
   options_.sky = {};  // the sky is not estimated
-  options_.visibility = {};
   options_.variants = std::max(2U, options.variants);
   report_.pilots = traced.size() / 2;
   const double before = cpu_seconds();

@@ -101,7 +101,7 @@ struct EstimateCheck {
 
 /// Estimates errors: shades every receiver of a run with a second variant of the gather, and
 /// compares. The results depend on neither threads nor memory cap.
-/// Memory: ShadeOptions::cache_bytes for readers_of() gathers. The Shader of the run reads through
+/// Memory: ShadeOptions::cache_bytes for readers_of() readers. The Shader of the run reads through
 /// the same cache.
 class Estimator {
  public:

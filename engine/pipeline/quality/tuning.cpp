@@ -226,6 +226,7 @@ class Tuner {
   /// Shades the pilots of a part at a rung. @return the errors of each pilot
   std::vector<ErrorSums> shade(std::size_t rung, std::size_t part) {
     const GatherOptions gather = ladder()[rung].options(options_.gather);
+    const VisibilityMaker visibility = options_.visibility_of_sky();
     const SceneView view(scene_);
     std::vector<std::unique_ptr<DirectionGrid>> grids;
     for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
@@ -234,11 +235,8 @@ class Tuner {
     std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
     std::vector<ErrorSums> errors((pilots_.size() + 1 - part) / 2);
     executor_.for_each(errors.size(), [&](std::size_t i, unsigned thread) {
-      if (!gathers[thread]) {
-        gathers[thread] = std::make_unique<Gather>(
-            view, *cache_, gather,
-            options_.visibility ? options_.visibility(view, *cache_) : nullptr);
-      }
+      if (!gathers[thread])
+        gathers[thread] = std::make_unique<Gather>(view, *cache_, gather, visibility);
       const std::size_t index = 2 * i + part;
       const Pilot& pilot = pilots_[index];
       std::vector<Shading> results(pilot.receivers.size());

@@ -114,10 +114,9 @@ DirectionGrid::DirectionGrid(unsigned resolution,
       glm::vec3 sum(0);
       for (int sub = 0; sub < 4; ++sub) {
         const float shift = static_cast<float>(step) * 0.25F;
-        glm::vec3 direction;
-        direction[a.w] = a.sign;
-        direction[a.u] = centre_[pixel % resolution] + (sub % 2 == 0 ? -shift : shift);
-        direction[a.v] = centre_[pixel / resolution] + (sub / 2 == 0 ? -shift : shift);
+        const glm::vec3 direction =
+            a.direction(centre_[pixel % resolution] + (sub % 2 == 0 ? -shift : shift),
+                        centre_[pixel / resolution] + (sub / 2 == 0 ? -shift : shift));
         sum += sky(glm::normalize(to_world * direction));
       }
       for (int c = 0; c < 3; ++c)

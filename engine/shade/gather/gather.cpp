@@ -39,7 +39,7 @@ void split(std::span<const PlacedReceiver> cell, const Body& body) {
 }  // namespace
 
 Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
-               std::unique_ptr<Visibility> visibility)
+               const VisibilityMaker& visibility)
     : scene_(view, cache),
       options_(options),
       empty_(options.resolution, options.bleeding),
@@ -47,7 +47,7 @@ Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& opt
   empty_.clear();
   const Surroundings& around = options.around;
   if (around.is_plain()) {
-    if (visibility) openings_.emplace(std::move(visibility));
+    if (visibility) openings_.emplace(visibility(view, cache));
     return;
   }
   weights_.emplace(PixelWeights{.sphere = around.sphere,

@@ -34,9 +34,9 @@ class Gather {
  public:
   /// @param view        must outlive the gather, as must the cache
   /// @param visibility  finds the sky through small openings, where the whole hemisphere counts;
-  ///                    null: the sky stays as it is drawn
+  ///                    empty: the sky stays as it is drawn
   Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
-         std::unique_ptr<Visibility> visibility = nullptr);
+         const VisibilityMaker& visibility = {});
 
   /// Shades receivers.
   /// @param receivers  neighbours, in any order; a few thousand at once share best

@@ -83,7 +83,7 @@ class Openings::Hemisphere {
   /// @param x, y  0 to 1 within the pixel
   [[nodiscard]] glm::vec3 direction(std::uint32_t pixel, float x, float y) const {
     const Place& place = places_[pixel];
-    return direction(CubeFace(place.face), coordinate(place.x, x), coordinate(place.y, y));
+    return CubeFace(place.face).direction(coordinate(place.x, x), coordinate(place.y, y));
   }
   /// Returns the height over the horizon of a direction, in its own length.
   [[nodiscard]] float height(const glm::vec3& d) const { return glm::dot(d, normal_); }
@@ -123,7 +123,7 @@ class Openings::Hemisphere {
       const CubeFace axes(static_cast<int>(face));
       for (std::uint32_t y = 0; y < side_; ++y) {
         const std::uint32_t first = (face * side_ + y) * side_;
-        const float slope = normal_[axes.u], row = height(direction(axes, 0, coordinate(y, 0.5F)));
+        const float slope = normal_[axes.u], row = height(axes.direction(0, coordinate(y, 0.5F)));
         if (!may_see(row + std::abs(slope))) continue;
         for (std::uint32_t x = 0; x < side_; ++x) {
           if (nearness[first + x] == 0 && may_see(row + slope * coordinate(x, 0.5F)))
@@ -137,13 +137,6 @@ class Openings::Hemisphere {
   /// Returns u or v at a place of a column or row.
   [[nodiscard]] float coordinate(std::uint32_t at, float within) const {
     return (static_cast<float>(at) + within) * step_ - 1;
-  }
-  [[nodiscard]] static glm::vec3 direction(const CubeFace& axes, float u, float v) {
-    glm::vec3 d;
-    d[axes.w] = axes.sign;
-    d[axes.u] = u;
-    d[axes.v] = v;
-    return d;
   }
   /// Returns the pixel that a direction of any length leads to.
   [[nodiscard]] std::uint32_t pixel_at(const glm::vec3& d) const {

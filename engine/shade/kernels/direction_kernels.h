@@ -55,6 +55,15 @@ struct CubeFace {
   /// Finds the axes of a face. @param face  0 to 5, as CubeGeometry numbers them
   constexpr explicit CubeFace(int face)
       : w(face / 2), u((w + 1) % 3), v((w + 2) % 3), sign(face % 2 == 0 ? 1.0F : -1.0F) {}
+
+  /// Returns (1, along_u, along_v), a direction through the face, in the axes of the cube.
+  [[nodiscard]] glm::vec3 direction(float along_u, float along_v) const {
+    glm::vec3 d;
+    d[w] = sign;
+    d[u] = along_u;
+    d[v] = along_v;
+    return d;
+  }
 };
 
 /// What covers each pixel, by face, row and column. Up to 4 rows past the last one are read, and
