@@ -20,10 +20,10 @@ namespace {
 constexpr float kLittleOpen = 0.06F, kMuchOpen = 0.1F;
 // Pixels to begin with up to which they are looked at, and from which on they are left as they are
 // drawn; and the most that are looked at. All of them over those of the cube
-constexpr float kFew = 256.0F / 6144, kMany = 384.0F / 6144, kMost = 768.0F / 6144;
-// Squares of 2 x 2 open pixels up to which what is drawn as open is mere chinks between discs, and
-// from which on it is an opening
-constexpr float kChink = 2, kOpening = 8;
+constexpr float kFew = 160.0F / 6144, kMany = 256.0F / 6144, kMost = 768.0F / 6144;
+// Squares of 2 x 2 pixels to begin with, over these pixels, up to which they are scattered, like
+// chinks between discs and leaves, and from which on they are an opening: 0.44 for 3 x 3 pixels
+constexpr float kScattered = 0.2F, kCompact = 0.4F;
 // Rays that are wanted in and around what is open, and the most of a pixel
 constexpr std::size_t kWantedRays = 128;
 constexpr std::uint32_t kMostOfPixel = 4;
@@ -116,7 +116,7 @@ class Openings::Hemisphere {
       }
     }
   }
-  /// Calls body(pixel) for each pixel that may see something and that nothing covers.
+  /// Calls body(pixel) for each pixel that nothing covers and whose middle lies above the horizon.
   template <class Body>
   void for_each_open(std::span<const float> nearness, const Body& body) const {
     for (std::uint32_t face = 0; face < 6; ++face) {
@@ -124,10 +124,9 @@ class Openings::Hemisphere {
       for (std::uint32_t y = 0; y < side_; ++y) {
         const std::uint32_t first = (face * side_ + y) * side_;
         const float slope = normal_[axes.u], row = height(axes.direction(0, coordinate(y, 0.5F)));
-        if (!may_see(row + std::abs(slope))) continue;
+        if (!(row + std::abs(slope) > 0)) continue;
         for (std::uint32_t x = 0; x < side_; ++x) {
-          if (nearness[first + x] == 0 && may_see(row + slope * coordinate(x, 0.5F)))
-            body(first + x);
+          if (nearness[first + x] == 0 && row + slope * coordinate(x, 0.5F) > 0) body(first + x);
         }
       }
     }
@@ -166,21 +165,18 @@ void Openings::visit(const Hemisphere& above, std::uint32_t pixel) {
   seen_.push_back(pixel);
 }
 
-// Visits what is drawn as open, and what was open to the receiver before. Returns how surely there
+// Visits what is drawn as open, and what was open to the receiver before. Returns how surely that
 // is an opening, 0 to 1.
 float Openings::begin(const Hemisphere& above, std::span<const float> nearness) {
+  above.for_each_open(nearness, [&](std::uint32_t pixel) { visit(above, pixel); });
+  for (const std::uint32_t pixel : last_) visit(above, pixel);
   const std::uint32_t side = above.side();
-  unsigned squares = 0;
-  above.for_each_open(nearness, [&](std::uint32_t i) {
-    visit(above, i);
-    if (places_[i].x + 1U == side || places_[i].y + 1U == side) return;
-    if (nearness[i + 1] == 0 && nearness[i + side] == 0 && nearness[i + side + 1] == 0 &&
-        above.height(i) > 0)
-      ++squares;
+  const auto squares = std::ranges::count_if(seen_, [&](std::uint32_t i) {
+    return places_[i].x + 1U < side && places_[i].y + 1U < side && state_[i + 1] != kUnseen &&
+           state_[i + side] != kUnseen && state_[i + side + 1] != kUnseen;
   });
-  const float opening = last_.empty() ? 1 - fall(kChink, kOpening, static_cast<float>(squares)) : 1;
-  for (const std::uint32_t i : last_) visit(above, i);
-  return opening;
+  const auto seen = static_cast<float>(seen_.size());
+  return 1 - fall(kScattered * seen, kCompact * seen, static_cast<float>(squares));
 }
 
 // Sends the rays `first` to `end` of each pixel of the wave, and marks pixels that are open.
