@@ -11,6 +11,7 @@
 #include "engine/pipeline/render/overview.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/render/render_picture.h"
+#include "engine/pipeline/render/tile_renderer.h"
 #include "engine/shade/shader.h"
 #include "tests/support/temporary_directory.h"
 
@@ -52,9 +53,74 @@ TEST_CASE("cloud picture: neither threads nor the cap change a pixel",
   const Image one = city.render(city.request);
   CHECK(std::ranges::count(one.pixels, one.pixels.front()) <
         static_cast<std::ptrdiff_t>(one.pixels.size() * 9 / 10));  // which is the sky
-  city.request.run = {.memory_bytes = std::uint64_t{118} << 20, .threads = 3};
+  city.request.run = {.memory_bytes = std::uint64_t{122} << 20, .threads = 3};
   const Image other = city.render(city.request);
   CHECK((other.pixels == one.pixels));
+}
+
+TEST_CASE("cloud picture: a view of parts sees what a view of the whole picture sees",
+          "[integration][render][cloud]") {
+  // From so close that holes reach as far as they may, and from afar
+  const City city;
+  const ContainerReader scene(city.request.scene);
+  const ThreadPool executor(2);
+  Progress silent;
+  Camera camera = overview(scene, {0, 1, 0}, {}, {});
+  camera.width = 401;
+  camera.height = 350;
+  for (const double share : {1.0, 0.2}) {
+    camera.position = camera.look_at + share * (camera.position - camera.look_at);
+    SurfelViewOptions options{.side = 2, .lift = 0.15F};
+    const auto whole = view_surfels(scene, camera, options, executor, silent);
+    options.depth_bytes = depth_bytes_for(256, 100);
+    const auto parts = view_surfels(scene, camera, options, executor, silent);
+    std::size_t seen = 0, unlike = 0;
+    const Tile tile{0, 0, 64, 50};
+    for (unsigned y0 = 0; y0 < camera.height; y0 += tile.height) {
+      for (unsigned x0 = 0; x0 < camera.width; x0 += tile.width) {
+        const SampleRect rect =
+            samples_of({x0, y0, std::min(camera.width - x0, tile.width), tile.height}, 2);
+        parts->look_at(rect);
+        for (unsigned y = rect.y0; y < rect.y1; ++y) {
+          for (unsigned x = rect.x0; x < rect.x1; ++x) {
+            const auto a = whole->at(x, y), b = parts->at(x, y);
+            if (a) ++seen;
+            if (a.has_value() != b.has_value() ||
+                (a && (a->position != b->position || a->direct != b->direct)))
+              ++unlike;
+          }
+        }
+      }
+    }
+    INFO(share);
+    CHECK(unlike == 0);
+    CHECK(seen > 100'000);
+  }
+}
+
+TEST_CASE("cloud picture: a picture whose depth buffer does not fit is the same, part by part",
+          "[integration][render][cloud]") {
+  City city;
+  city.request.size = {{700, 300}};
+  city.request.samples = 16;  // 80 MB of depth buffer
+  city.request.run.memory_bytes = std::uint64_t{1} << 30;
+  const Image whole = city.render(city.request);
+  city.request.run.memory_bytes = std::uint64_t{192} << 20;
+  CHECK((city.render(city.request).pixels == whole.pixels));
+}
+
+TEST_CASE("render: wide pictures have low tiles of as many pixels", "[render]") {
+  for (const unsigned side : {1U, 2U, 3U, 4U, 8U}) {
+    const Tile usual = TileRenderer::tile_of(960, side);
+    CHECK(usual.width == 256 / std::min(side, 4U));
+    CHECK(usual.height == usual.width);
+    for (const unsigned width : {1U, 4096U, 20'000U, 65'536U}) {
+      const Tile tile = TileRenderer::tile_of(width, side);
+      CHECK(tile.pixels() <= usual.pixels());  // odd heights are rounded down
+      CHECK(tile.pixels() > usual.pixels() * 9 / 10);
+      CHECK(std::uint64_t{width} * tile.height <= 1U << 19);
+    }
+  }
 }
 
 TEST_CASE("cloud picture: far samples are gathered coarsely, unless the request says how",

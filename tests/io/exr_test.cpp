@@ -1,7 +1,10 @@
 // Writing and reading OpenEXR pictures.
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <span>
 #include <stdexcept>
+#include <vector>
 
 #include <ImfChannelList.h>
 #include <ImfCompression.h>
@@ -86,7 +89,7 @@ void check_picture(const Image& image, const std::array<float, 3>& base) {
 TEST_CASE("exr: a picture with more pixels than the caller allows is refused", "[io][exr]") {
   const test::TemporaryDirectory scratch;
   const auto path = scratch.path() / "a.exr";
-  write_exr(path, 10, 20, {{.values = std::vector<float>(600, 1.0F)}});
+  write_exr(path, 10, 20, {{{}, std::vector<float>(600, 1.0F)}});
   CHECK(read_image(path, 200).width == 10);
   CHECK_THROWS_WITH(
       static_cast<void>(read_image(path, 199)),
@@ -148,6 +151,34 @@ TEST_CASE("exr: layers that do not fit are refused and leave no file", "[io][exr
   CHECK_THROWS_AS(write_exr(path, 2, 2, {}), std::invalid_argument);
   CHECK_THROWS_AS(write_exr(scratch.path() / "none" / "a.exr", 2, 2, {good}), std::system_error);
   CHECK(scratch.listing().empty());
+}
+
+TEST_CASE("exr: rows that come a few at a time make the file that all at once make", "[io][exr]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<float> colour = ramp(7 * 45 * 3), scalar = ramp(7 * 45);
+  const std::vector<ExrLayerType> layers{{"", ExrLayerType::Kind::colour, false},
+                                         {"depth", ExrLayerType::Kind::scalar, true}};
+  write_exr(scratch.path() / "whole.exr", 7, 45, {{layers[0], colour}, {layers[1], scalar}});
+  ExrWriter writer(scratch.path() / "parts.exr", 7, 45, layers);
+  const auto write = [&](unsigned first, unsigned rows) {
+    const std::array<std::span<const float>, 2> values{
+        std::span(colour).subspan(std::size_t{first} * 21, std::size_t{rows} * 21),
+        std::span(scalar).subspan(std::size_t{first} * 7, std::size_t{rows} * 7)};
+    writer.write(rows, values);
+  };
+  write(0, 1);
+  write(1, 0);
+  write(1, 30);
+  CHECK_THROWS_AS(writer.publish(), std::invalid_argument);
+  const std::array<std::span<const float>, 2> too_few{std::span(colour).first(21),
+                                                      std::span(scalar).first(6)};
+  CHECK_THROWS_AS(writer.write(1, too_few), std::invalid_argument);
+  write(31, 14);
+  CHECK_THROWS_AS(write(44, 1), std::invalid_argument);
+  CHECK(!std::filesystem::exists(scratch.path() / "parts.exr"));
+  writer.publish();
+  CHECK(scratch.listing() == "parts.exr whole.exr");
+  CHECK(slurp(scratch.path() / "parts.exr") == slurp(scratch.path() / "whole.exr"));
 }
 
 TEST_CASE("exr: every compression, type and tiling of the library is read", "[io][exr]") {

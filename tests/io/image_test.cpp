@@ -1,8 +1,13 @@
 // 8-bit pictures: the sRGB curve, the formats, and what damaged files do.
 #include "engine/io/image/image.h"
 
+#include <sys/resource.h>
+
 #include <cmath>
+#include <csignal>
+#include <span>
 #include <stdexcept>
+#include <system_error>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -160,6 +165,43 @@ TEST_CASE("png: sizes that do not match the pixels are refused", "[io][image]") 
   CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {}), std::invalid_argument);
   CHECK_THROWS_AS(write_png(scratch.path() / "a.png", {65537, 1, std::vector<glm::vec3>(65537)}),
                   std::invalid_argument);
+  CHECK(scratch.listing().empty());
+}
+
+TEST_CASE("png: rows that come a few at a time make the file that all at once make",
+          "[io][image]") {
+  const test::TemporaryDirectory scratch;
+  const Image image = gradient();
+  const std::span<const glm::vec3> pixels = image.pixels;
+  write_png(scratch.path() / "whole.png", image);
+  PngWriter writer(scratch.path() / "parts.png", 16, 16);
+  writer.write(pixels.first(16));
+  CHECK_THROWS_AS(writer.write(pixels.first(15)), std::invalid_argument);
+  CHECK_THROWS_AS(writer.publish(), std::invalid_argument);
+  writer.write(pixels.subspan(16));
+  CHECK_THROWS_AS(writer.write(pixels.first(16)), std::invalid_argument);
+  writer.publish();
+  CHECK(scratch.listing() == "parts.png whole.png");
+  CHECK(slurp(scratch.path() / "parts.png") == slurp(scratch.path() / "whole.png"));
+}
+
+TEST_CASE("png: a disk that is full is told, and leaves no file", "[io][image]") {
+  // 300 x 300 pixels of noise do not fit the limit on the size of files
+  const test::TemporaryDirectory scratch;
+  Image image{300, 300, {}};
+  std::uint32_t noise = 1;
+  for (int i = 0; i < 90'000; ++i) {
+    noise = noise * 1664525U + 1013904223U;
+    image.pixels.emplace_back(linear(static_cast<int>(noise >> 24)));
+  }
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{20'000, before.rlim_max};
+  setrlimit(RLIMIT_FSIZE, &small);
+  CHECK_THROWS_AS(write_png(scratch.path() / "a.png", image), std::system_error);
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
   CHECK(scratch.listing().empty());
 }
 

@@ -9,9 +9,12 @@
 #include <cmath>
 #include <exception>
 #include <new>
+#include <optional>
 #include <set>
 #include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
@@ -141,47 +144,44 @@ class PublishedStream : public Imf::OStream {
   std::exception_ptr failure_;
 };
 
-std::vector<std::string> channel_names(const ExrLayer& layer) {
+std::vector<std::string> channel_names(const ExrLayerType& layer) {
   const std::string prefix = layer.name.empty() ? "" : layer.name + ".";
   switch (layer.kind) {
-    case ExrLayer::Kind::scalar:
+    case ExrLayerType::Kind::scalar:
       return {prefix + "V"};
-    case ExrLayer::Kind::vector:
+    case ExrLayerType::Kind::vector:
       return {prefix + "X", prefix + "Y", prefix + "Z"};
-    case ExrLayer::Kind::colour:
+    case ExrLayerType::Kind::colour:
       break;
   }
   return {prefix + "R", prefix + "G", prefix + "B"};
 }
 
-void check_layers(unsigned width, unsigned height, const std::vector<ExrLayer>& layers) {
+void check_layers(unsigned width, unsigned height, const std::vector<ExrLayerType>& layers) {
   if (!is_image_size(width, height)) {
-    throw std::invalid_argument("write_exr: the size is out of range");
+    throw std::invalid_argument("ExrWriter: the size is out of range");
   }
-  const std::uint64_t count = std::uint64_t{width} * height;
-  if (layers.empty()) throw std::invalid_argument("write_exr: there is no layer");
+  if (layers.empty()) throw std::invalid_argument("ExrWriter: there is no layer");
   std::set<std::string> seen;
-  for (const ExrLayer& layer : layers) {
-    const std::vector<std::string> names = channel_names(layer);
-    if (layer.values.size() != count * names.size()) {
-      throw std::invalid_argument("write_exr: layer '" + layer.name + "' has " +
-                                  std::to_string(layer.values.size()) + " values, not " +
-                                  std::to_string(count * names.size()));
-    }
-    for (const std::string& name : names) {
-      if (!seen.insert(name).second) throw std::invalid_argument("write_exr: two channels " + name);
+  for (const ExrLayerType& layer : layers) {
+    for (const std::string& name : channel_names(layer)) {
+      if (!seen.insert(name).second) throw std::invalid_argument("ExrWriter: two channels " + name);
     }
   }
 }
 
-// Rounds values to half; finite values beyond its range become the greatest half.
-std::vector<half> as_halves(const std::vector<float>& values) {
-  std::vector<half> halves(values.size());
-  std::ranges::transform(values, halves.begin(), [](float value) {
-    const float most = static_cast<float>(HALF_MAX);
-    return half(std::isfinite(value) ? std::clamp(value, -most, most) : value);
-  });
-  return halves;
+// Rounds a value to half; finite values beyond its range become the greatest half.
+half as_half(float value) {
+  const float most = static_cast<float>(HALF_MAX);
+  return half(std::isfinite(value) ? std::clamp(value, -most, most) : value);
+}
+
+Imf::PixelType pixel_type(const ExrLayerType& layer) {
+  return layer.full_float ? Imf::FLOAT : Imf::HALF;
+}
+
+std::size_t value_bytes(const ExrLayerType& layer) {
+  return layer.full_float ? sizeof(float) : sizeof(half);
 }
 
 }  // namespace
@@ -197,46 +197,124 @@ Image read_exr(const std::filesystem::path& path, std::uint64_t max_pixels) {
   }
 }
 
-void write_exr(const std::filesystem::path& target, unsigned width, unsigned height,
-               const std::vector<ExrLayer>& layers) {
-  check_layers(width, height, layers);
+struct ExrWriter::State {
+  unsigned width, height;
+  std::vector<ExrLayerType> layers;
+  OutputFile file;
+  PublishedStream stream;
+  std::optional<Imf::OutputFile> picture;
+  unsigned written = 0;                   // rows
+  std::vector<std::vector<half>> halves;  // rows of each layer in the type that is stored
 
-  // Describe the channels and where their values lie.
-  Imf::Header header(static_cast<int>(width), static_cast<int>(height));
-  header.compression() = Imf::ZIP_COMPRESSION;
+  State(const std::filesystem::path& target, unsigned columns, unsigned rows,
+        std::vector<ExrLayerType> of)
+      : width(columns),
+        height(rows),
+        layers(std::move(of)),
+        file(target),
+        stream(file),
+        halves(layers.size()) {
+    Imf::Header header(static_cast<int>(width), static_cast<int>(height));
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const ExrLayerType& layer : layers) {
+      for (const std::string& name : channel_names(layer))
+        header.channels().insert(name, Imf::Channel(pixel_type(layer)));
+    }
+    try {
+      picture.emplace(stream, header, 0);
+    } catch (...) {
+      stream.rethrow_failure();  // the library would hide the reason
+      throw;
+    }
+  }
+};
+
+ExrWriter::ExrWriter(const std::filesystem::path& target, unsigned width, unsigned height,
+                     std::vector<ExrLayerType> layers) {
+  check_layers(width, height, layers);
+  state_ = std::make_unique<State>(target, width, height, std::move(layers));
+}
+
+ExrWriter::~ExrWriter() = default;
+
+void ExrWriter::write(unsigned rows, std::span<const std::span<const float>> values) {
+  // Check the values
+  State& s = *state_;
+  if (rows > s.height - s.written || values.size() != s.layers.size())
+    throw std::invalid_argument("ExrWriter: rows or layers do not match the picture");
+  const std::size_t pixels = std::size_t{rows} * s.width;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (values[i].size() != pixels * s.layers[i].components()) {
+      throw std::invalid_argument("ExrWriter: layer '" + s.layers[i].name + "' has " +
+                                  std::to_string(values[i].size()) + " values, not " +
+                                  std::to_string(pixels * s.layers[i].components()));
+    }
+  }
+  if (rows == 0) return;
+
+  // Say where the values of each channel lie
   Imf::FrameBuffer buffer;
-  std::vector<std::vector<half>> halves;  // the library wants values in the type that is stored
-  halves.reserve(layers.size());
-  for (const ExrLayer& layer : layers) {
-    if (!layer.full_float) halves.push_back(as_halves(layer.values));
-    const Imf::PixelType type = layer.full_float ? Imf::FLOAT : Imf::HALF;
-    const std::size_t value_bytes = layer.full_float ? sizeof(float) : sizeof(half);
-    const char* base = layer.full_float ? reinterpret_cast<const char*>(layer.values.data())
-                                        : reinterpret_cast<const char*>(halves.back().data());
+  const Imath::V2i origin(0, static_cast<int>(s.written));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const ExrLayerType& layer = s.layers[i];
+    const auto* base = reinterpret_cast<const char*>(values[i].data());
+    if (!layer.full_float) {
+      s.halves[i].resize(values[i].size());
+      std::ranges::transform(values[i], s.halves[i].begin(), as_half);
+      base = reinterpret_cast<const char*>(s.halves[i].data());
+    }
     const std::vector<std::string> names = channel_names(layer);
-    const std::size_t stride = value_bytes * names.size();
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      header.channels().insert(names[i], Imf::Channel(type));
-      buffer.insert(names[i], Imf::Slice::Make(type, base + i * value_bytes, header.dataWindow(),
-                                               stride, stride * width));
+    const std::size_t stride = value_bytes(layer) * names.size();
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      buffer.insert(names[c], Imf::Slice::Make(pixel_type(layer), base + c * value_bytes(layer),
+                                               origin, std::int64_t{s.width}, std::int64_t{rows},
+                                               stride, stride * s.width));
     }
   }
 
-  // Write the picture under a temporary name.
-  OutputFile file(target);
-  PublishedStream stream(file);
-  {
-    Imf::OutputFile picture(stream, header, 0);
-    picture.setFrameBuffer(buffer);
-    picture.writePixels(static_cast<int>(height));
+  // Write them
+  try {
+    s.picture->setFrameBuffer(buffer);
+    s.picture->writePixels(static_cast<int>(rows));
+  } catch (...) {
+    s.stream.rethrow_failure();
+    throw;
   }
-  stream.rethrow_failure();
+  s.written += rows;
+}
 
+void ExrWriter::publish() {
+  State& s = *state_;
+  if (s.written != s.height) throw std::invalid_argument("ExrWriter: rows are missing");
+  s.picture.reset();
+  s.stream.rethrow_failure();
   // Check that all lines are there: when the library has no memory to compress a line, it leaves
-  // the line out without an error.
-  const Imf::MultiPartInputFile written(file.temporary().c_str(), 0, false);
+  // the line out without an error
+  const Imf::MultiPartInputFile written(s.file.temporary().c_str(), 0, false);
   if (!written.partComplete(0)) throw std::bad_alloc();
-  file.publish();
+  s.file.publish();
+}
+
+std::uint64_t ExrWriter::bytes(unsigned width, unsigned rows,
+                               std::span<const ExrLayerType> layers) noexcept {
+  // The library holds the lines of a chunk, as they are and compressed
+  constexpr std::uint64_t kChunkRows = 16, kCopies = 3;
+  std::uint64_t pixel = 0, halves = 0;
+  for (const ExrLayerType& layer : layers) {
+    pixel += value_bytes(layer) * layer.components();
+    if (!layer.full_float) halves += sizeof(half) * layer.components();
+  }
+  return std::uint64_t{width} * (kCopies * kChunkRows * pixel + rows * halves);
+}
+
+void write_exr(const std::filesystem::path& target, unsigned width, unsigned height,
+               const std::vector<ExrLayer>& layers) {
+  std::vector<ExrLayerType> types(layers.begin(), layers.end());
+  std::vector<std::span<const float>> values;
+  for (const ExrLayer& layer : layers) values.emplace_back(layer.values);
+  ExrWriter writer(target, width, height, std::move(types));
+  writer.write(height, values);
+  writer.publish();
 }
 
 }  // namespace ptc

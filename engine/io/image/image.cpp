@@ -1,4 +1,4 @@
-// Pictures that stb decodes, the choice of the reader, and the writer of PNG.
+// Pictures that stb decodes, and the choice of the reader.
 //
 // stb trusts the sizes in a file and fills in what is missing. So a file passes three gates before
 // it is decoded: raster_format() by its first bytes, check_size() by its width and height, and
@@ -10,11 +10,8 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
-#include <new>
-#include <stdexcept>
 
 #include <stb_image.h>
-#include <stb_image_write.h>
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
@@ -106,27 +103,6 @@ Image decode_integers(const stbi_uc* data, int bytes, const std::string& name) {
   return image;
 }
 
-// The bytes that stb has encoded. Its callback must not throw through C, so a failure is recorded.
-struct EncodedBytes {
-  std::vector<std::byte> bytes;
-  bool out_of_memory = false;
-};
-
-void collect(void* context, void* data, int size) {
-  auto& encoded = *static_cast<EncodedBytes*>(context);
-  const auto* from = static_cast<const std::byte*>(data);
-  try {
-    encoded.bytes.insert(encoded.bytes.end(), from, from + size);
-  } catch (const std::bad_alloc&) {
-    encoded.out_of_memory = true;
-  }
-}
-
-std::uint8_t stored_8_bit(float linear) {
-  const double clamped = linear > 0 ? std::min(1.0, static_cast<double>(linear)) : 0.0;
-  return static_cast<std::uint8_t>(std::lround(255 * linear_to_srgb(clamped)));
-}
-
 }  // namespace
 
 Image decode_image(std::span<const std::byte> bytes, const std::string& name,
@@ -159,26 +135,6 @@ Image read_image(const std::filesystem::path& path, std::uint64_t max_pixels) {
   std::vector<std::byte> bytes(file.size());
   file.read_at(0, bytes);
   return decode_image(bytes, path.string(), max_pixels);
-}
-
-void write_png(const std::filesystem::path& target, const Image& image) {
-  const std::size_t count = std::size_t{image.width} * image.height;
-  if (!is_image_size(image.width, image.height) || image.pixels.size() != count) {
-    throw std::invalid_argument("write_png: the number of pixels does not match the size");
-  }
-  std::vector<std::uint8_t> stored;
-  stored.reserve(count * 3);
-  for (const glm::vec3& pixel : image.pixels) {
-    for (int i = 0; i < 3; ++i) stored.push_back(stored_8_bit(pixel[i]));
-  }
-  EncodedBytes encoded;
-  const int width = static_cast<int>(image.width);
-  const int done = stbi_write_png_to_func(collect, &encoded, width, static_cast<int>(image.height),
-                                          3, stored.data(), width * 3);
-  if (done == 0 || encoded.out_of_memory) throw std::bad_alloc();
-  OutputFile file(target);
-  file.append(encoded.bytes);
-  file.publish();
 }
 
 }  // namespace ptc

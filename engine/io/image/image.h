@@ -1,9 +1,11 @@
-// Reading and writing of pictures: EXR through OpenEXR, other formats through stb.
+// Reading and writing of pictures: EXR through OpenEXR, PNG is written through libpng, and other
+// formats are read through stb.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -54,27 +56,86 @@ struct Image {
 [[nodiscard]] Image decode_image(std::span<const std::byte> bytes, const std::string& name,
                                  std::uint64_t max_pixels = kMaxImagePixels);
 
-/// One layer of an EXR file. A colour has the channels "NAME.R", "NAME.G" and "NAME.B", or "R", "G"
-/// and "B" when the name is empty. A scalar has the channel "NAME.V"; a vector has the channels
-/// "NAME.X", "NAME.Y" and "NAME.Z".
-struct ExrLayer {
+/// What an EXR file says of a layer. A colour has the channels "NAME.R", "NAME.G" and "NAME.B", or
+/// "R", "G" and "B" when the name is empty. A scalar has the channel "NAME.V"; a vector has the
+/// channels "NAME.X", "NAME.Y" and "NAME.Z".
+struct ExrLayerType {
   std::string name;
   enum class Kind { colour, scalar, vector } kind = Kind::colour;
-  bool full_float = false;    ///< float channels; else half, where values above 65504 become 65504
-  std::vector<float> values;  ///< height x width x components, components being 3 or 1
+  bool full_float = false;  ///< float channels; else half, where values above 65504 become 65504
+
+  /// Returns the number of channels.
+  [[nodiscard]] unsigned components() const noexcept { return kind == Kind::scalar ? 1 : 3; }
 };
 
-/// Writes an EXR file of scan lines with ZIP compression. The file replaces `target` as a whole or
-/// not at all.
-/// @throws std::system_error; std::invalid_argument when the number of a layer's values does not
-///         match the size, two layers have the same name, a side is 0 or above 2^16, or there are
-///         more than 2^28 pixels
+/// One layer of an EXR file with the values of all pixels.
+struct ExrLayer : ExrLayerType {
+  std::vector<float> values;  ///< height x width x components
+};
+
+/// Writes an EXR file of scan lines with ZIP compression, some rows at a time. The file replaces
+/// its target as a whole or not at all.
+/// Memory: bytes().
+class ExrWriter {
+ public:
+  /// Creates a temporary file for the picture.
+  /// @throws std::system_error; std::invalid_argument when the size is not is_image_size(), there
+  ///         is no layer or two have the same name
+  ExrWriter(const std::filesystem::path& target, unsigned width, unsigned height,
+            std::vector<ExrLayerType> layers);
+  ~ExrWriter();
+  ExrWriter(const ExrWriter&) = delete;
+  ExrWriter& operator=(const ExrWriter&) = delete;
+
+  /// Writes the next rows, from the top of the picture down.
+  /// @param values  rows x width x components of each layer
+  /// @throws std::system_error; std::invalid_argument when the values do not match the rows, or
+  ///         these are more than are left
+  void write(unsigned rows, std::span<const std::span<const float>> values);
+  /// Publishes the picture. @pre all rows are written
+  /// @throws std::system_error; std::bad_alloc when rows are missing for want of memory
+  void publish();
+
+  /// Returns the memory that writing `rows` rows at once takes.
+  [[nodiscard]] static std::uint64_t bytes(unsigned width, unsigned rows,
+                                           std::span<const ExrLayerType> layers) noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Writes a whole picture by an ExrWriter.
+/// @throws as ExrWriter does
 void write_exr(const std::filesystem::path& target, unsigned width, unsigned height,
                const std::vector<ExrLayer>& layers);
 
-/// Writes an 8-bit sRGB PNG file of linear values, which are clamped to [0, 1]. The file replaces
-/// `target` as a whole or not at all.
-/// @throws std::system_error; std::invalid_argument as write_exr() does
+/// Writes an 8-bit sRGB PNG file of linear values, which are clamped to [0, 1], some rows at a
+/// time. The file replaces its target as a whole or not at all.
+/// Memory: some 300 KiB, and 15 bytes for each pixel of a row.
+class PngWriter {
+ public:
+  /// Creates a temporary file for the picture.
+  /// @throws std::system_error; std::invalid_argument when the size is not is_image_size()
+  PngWriter(const std::filesystem::path& target, unsigned width, unsigned height);
+  ~PngWriter();
+  PngWriter(const PngWriter&) = delete;
+  PngWriter& operator=(const PngWriter&) = delete;
+
+  /// Writes the next rows, from the top of the picture down.
+  /// @param pixels  whole rows
+  /// @throws std::system_error; std::invalid_argument for a row in part or more than are left
+  void write(std::span<const glm::vec3> pixels);
+  /// Publishes the picture. @pre all rows are written   @throws std::system_error
+  void publish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// Writes a whole picture by a PngWriter.
+/// @throws as PngWriter does
 void write_png(const std::filesystem::path& target, const Image& image);
 
 }  // namespace ptc

@@ -21,6 +21,7 @@
 #include "engine/store/attribute_rows.h"
 #include "engine/trace/camera_tracer.h"
 #include "format/point_page.h"
+#include "format/scalar.h"
 
 namespace ptc {
 namespace {
@@ -37,32 +38,61 @@ unsigned even_bits(unsigned number) {
   return found;
 }
 
-/// A view of the surfels of a container.
+/// A view of the surfels of a container: of the whole picture or, where the depth buffer would take
+/// too much, of the rectangle that is looked at, with a margin from which its holes are closed.
+///
+///     +- - - - - - - - - -+
+///       kHoleReach        '
+///     ' +-------------+   '
+///       |  seen_      |       seen_ grows to the right as far as the depth buffer allows
+///     ' |             |   '
+///       +-------------+       area_ is traced
+///     +- - - - - - - - - -+
 class CloudView : public SplatView {
  public:
-  CloudView(const ContainerReader& scene, const Camera& camera, const SurfelViewOptions& options)
+  CloudView(const ContainerReader& scene, const Camera& camera, const SurfelViewOptions& options,
+            const Executor& executor)
       : SplatView(scene, camera, options.side, options.lift),
         scene_(scene),
+        options_(options),
+        executor_(executor),
         view_(scene, options.lost),
         rise_groups_(rise_groups(scene.meta().channels)) {}
 
-  /// Traces the rays of all samples.
-  void trace(const SurfelViewOptions& options, const Executor& executor, Progress& progress) {
-    PageCache cache(scene_, cache_options(options, executor.threads()));
-    std::vector<std::unique_ptr<Worker>> workers(executor.threads());
-    const unsigned columns = (width_ + kBlockSide - 1) / kBlockSide,
-                   rows = (height_ + kBlockSide - 1) / kBlockSide;
-    executor.for_each(std::size_t{columns} * rows, [&](std::size_t block, unsigned thread) {
-      if (!workers[thread]) workers[thread] = std::make_unique<Worker>(*this, cache);
-      const unsigned x0 = static_cast<unsigned>(block % columns) * kBlockSide,
-                     y0 = static_cast<unsigned>(block / columns) * kBlockSide;
-      for (unsigned y = y0; y < std::min(height_, y0 + kBlockSide); y += kTileSide) {
-        for (unsigned x = x0; x < std::min(width_, x0 + kBlockSide); x += kTileSide)
-          progress.advance(trace_tile(x, y, *workers[thread]));
-      }
-    });
-    workers.clear();
-    finish(executor);
+  /// Says whether the depth buffer may hold the whole picture.
+  [[nodiscard]] bool holds_all() const {
+    return whole().samples() * kSplatBytes <= options_.depth_bytes;
+  }
+
+  /// Looks at the whole picture. Nothing has to be looked at afterwards.
+  void look_at_all(Progress& progress) {
+    trace(whole(), progress);
+    finish(executor_);
+    free_pages();
+    seen_ = whole();
+  }
+
+  void look_at(const SampleRect& rect) override {
+    if (seen_.contains(rect)) return;
+    Progress silent;
+    seen_ = widened(rect);
+    trace(around(seen_), silent);
+    finish(executor_);
+  }
+
+  /// Returns what sparse_share() describes for a view that is this many times finer.
+  [[nodiscard]] double sparse_share(float finer) {
+    constexpr float kSparse = 1;  // radii
+    Progress silent;
+    trace(whole(), silent);
+    std::size_t seen = 0, sparse = 0;
+    for (const SplatSample& sample : samples_) {
+      if (sample.empty()) continue;
+      ++seen;
+      const float radius = scale_.radius(decode_ufloat16(sample.payload.radius));
+      if (sample.depth > kSparse * radius * focal_ * finer) ++sparse;
+    }
+    return seen == 0 ? 0 : static_cast<double>(sparse) / static_cast<double>(seen);
   }
 
  private:
@@ -82,13 +112,58 @@ class CloudView : public SplatView {
           rise(attributes.channels()) {}
   };
 
-  [[nodiscard]] CacheOptions cache_options(const SurfelViewOptions& options,
-                                           unsigned threads) const {
+  /// Adds the margin that its holes need to a rectangle.
+  [[nodiscard]] SampleRect around(const SampleRect& rect) const {
+    const auto before = [](unsigned at) { return at - std::min(at, kHoleReach); };
+    return {before(rect.x0), before(rect.y0), std::min(width_, rect.x1 + kHoleReach),
+            std::min(height_, rect.y1 + kHoleReach)};
+  }
+
+  /// Lets a rectangle grow to the right as far as the depth buffer allows.
+  [[nodiscard]] SampleRect widened(SampleRect rect) const {
+    const SampleRect traced = around(rect);
+    const std::uint64_t columns = options_.depth_bytes / kSplatBytes / (traced.y1 - traced.y0);
+    if (columns > traced.x1 - traced.x0) {
+      const std::uint64_t right = traced.x0 + columns;
+      rect.x1 =
+          right >= width_ ? width_ : std::max(rect.x1, static_cast<unsigned>(right) - kHoleReach);
+    }
+    return rect;
+  }
+
+  /// Traces the rays of a part of the picture.
+  void trace(const SampleRect& area, Progress& progress) {
+    begin(area);
+    if (!cache_) {
+      cache_ = std::make_unique<PageCache>(scene_, cache_options());
+      workers_.resize(executor_.threads());
+    }
+    const unsigned columns = (area.x1 - area.x0 + kBlockSide - 1) / kBlockSide,
+                   rows = (area.y1 - area.y0 + kBlockSide - 1) / kBlockSide;
+    executor_.for_each(std::size_t{columns} * rows, [&](std::size_t block, unsigned thread) {
+      if (!workers_[thread]) workers_[thread] = std::make_unique<Worker>(*this, *cache_);
+      const unsigned x0 = area.x0 + static_cast<unsigned>(block % columns) * kBlockSide,
+                     y0 = area.y0 + static_cast<unsigned>(block / columns) * kBlockSide;
+      for (unsigned y = y0; y < std::min(area.y1, y0 + kBlockSide); y += kTileSide) {
+        for (unsigned x = x0; x < std::min(area.x1, x0 + kBlockSide); x += kTileSide)
+          progress.advance(trace_tile(x, y, *workers_[thread]));
+      }
+    });
+  }
+
+  void free_pages() {
+    workers_.clear();
+    cache_.reset();
+  }
+
+  [[nodiscard]] CacheOptions cache_options() const {
+    const unsigned threads = executor_.threads();
     const std::uint64_t tracers = threads * CameraTracer::kBytes;
-    const std::uint64_t left = options.memory_bytes - std::min(options.memory_bytes, tracers);
-    return {.memory_bytes = std::max(left, PageCache::min_bytes(scene_, threads, options.back_end)),
-            .threads = threads,
-            .back_end = options.back_end};
+    const std::uint64_t left = options_.memory_bytes - std::min(options_.memory_bytes, tracers);
+    return {
+        .memory_bytes = std::max(left, PageCache::min_bytes(scene_, threads, options_.back_end)),
+        .threads = threads,
+        .back_end = options_.back_end};
   }
 
   /// Traces the rays of a tile. @return the number of its samples
@@ -97,8 +172,8 @@ class CloudView : public SplatView {
     own.directions.clear();
     for (unsigned i = 0; i < kTileSide * kTileSide; ++i) {
       const unsigned x = x0 + even_bits(i), y = y0 + even_bits(i >> 1);
-      if (x >= width_ || y >= height_) continue;
-      own.samples.push_back(std::size_t{y} * width_ + x);
+      if (x >= area_.x1 || y >= area_.y1) continue;
+      own.samples.push_back(place_of(x, y));
       own.directions.push_back(axes_ * ray(x, y));
     }
     own.hits.assign(own.samples.size(), RayHit{});
@@ -134,8 +209,13 @@ class CloudView : public SplatView {
   }
 
   const ContainerReader& scene_;
+  const SurfelViewOptions options_;
+  const Executor& executor_;
   SceneView view_;
   std::vector<std::uint8_t> rise_groups_;
+  SampleRect seen_;                   ///< what at() knows
+  std::unique_ptr<PageCache> cache_;  ///< null before the first ray, and when all is seen
+  std::vector<std::unique_ptr<Worker>> workers_;  ///< by thread
 };
 
 }  // namespace
@@ -143,9 +223,34 @@ class CloudView : public SplatView {
 std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene, const Camera& camera,
                                           const SurfelViewOptions& options,
                                           const Executor& executor, Progress& progress) {
-  auto view = std::make_unique<CloudView>(scene, camera, options);
-  view->trace(options, executor, progress);
+  auto view = std::make_unique<CloudView>(scene, camera, options, executor);
+  if (view->holds_all()) view->look_at_all(progress);
   return view;
+}
+
+double sparse_share(const ContainerReader& scene, const Camera& camera,
+                    const SurfelViewOptions& options, const Executor& executor) {
+  // A picture that is this many times coarser, but has 64 samples along a side if there are so many
+  const unsigned width = camera.width * options.side, height = camera.height * options.side;
+  const unsigned step = std::clamp(std::max(width, height) / 64, 1U, 16U);
+  Camera coarse = camera;
+  coarse.width = std::max(1U, width / step);
+  coarse.height = std::max(1U, height / step);
+  SurfelViewOptions with = options;
+  with.side = 1;
+  const auto finer = static_cast<float>(height) / static_cast<float>(coarse.height);
+  return CloudView(scene, coarse, with, executor).sparse_share(finer);
+}
+
+std::uint64_t depth_bytes_for(unsigned width, unsigned height) noexcept {
+  return (width + std::uint64_t{2} * kHoleReach) * (height + std::uint64_t{2} * kHoleReach) *
+         kSplatBytes;
+}
+
+std::uint64_t view_bytes(const ContainerReader& scene, unsigned threads, BackEnd back_end) {
+  constexpr std::uint64_t kPages = std::uint64_t{16} << 20;
+  return threads * CameraTracer::kBytes +
+         std::max(kPages, PageCache::min_bytes(scene, threads, back_end));
 }
 
 }  // namespace ptc

@@ -8,18 +8,13 @@
 #include <functional>
 #include <numbers>
 
-#include "engine/io/image/image.h"
-#include "engine/io/text/text.h"
-
 namespace ptc {
 namespace {
 
 /// Returns the components of all pixels one after another, as image files take them.
-std::vector<float> flatten(const std::vector<glm::vec3>& values) {
-  std::vector<float> flat;
-  flat.reserve(values.size() * 3);
-  for (const glm::vec3& v : values) flat.insert(flat.end(), {v.x, v.y, v.z});
-  return flat;
+std::span<const float> flat(const std::vector<glm::vec3>& values) {
+  static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
+  return {values.empty() ? nullptr : &values.front().x, values.size() * 3};
 }
 
 }  // namespace
@@ -75,18 +70,27 @@ void Film::add(std::size_t pixel, std::span<const float> shadows, float weight) 
   for (std::size_t i = 0; i < shadows.size(); ++i) shadows_[i].second[pixel] += weight * shadows[i];
 }
 
-void Film::add_group(const std::string& layer, const Film& group) {
-  const auto add = [](std::vector<glm::vec3>& to, const std::vector<glm::vec3>& light) {
-    std::ranges::transform(to, light, to.begin(), std::plus<>());
+void Film::add_group(const std::string& layer, const Film& group, unsigned first) {
+  // Light adds up
+  const auto at = std::ptrdiff_t{first} * width_;
+  const auto add = [at](std::vector<glm::vec3>& to, const std::vector<glm::vec3>& light) {
+    std::transform(light.begin(), light.end(), to.begin() + at, to.begin() + at, std::plus<>());
   };
   add(beauty_, group.beauty_);
   add(direct_, group.direct_);
   add(indirect_, group.indirect_);
-  bent_normal_ = group.bent_normal_;
-  albedo_ = group.albedo_;
-  occlusion_ = group.occlusion_;
-  alpha_ = group.alpha_;
-  groups_.emplace_back(layer, group.beauty_);
+
+  // The rest is the same for all groups
+  const auto take = [at](auto& to, const auto& from) { std::ranges::copy(from, to.begin() + at); };
+  take(bent_normal_, group.bent_normal_);
+  take(albedo_, group.albedo_);
+  take(occlusion_, group.occlusion_);
+  take(alpha_, group.alpha_);
+  auto own =
+      std::ranges::find(groups_, layer, &std::pair<std::string, std::vector<glm::vec3>>::first);
+  if (own == groups_.end())
+    own = groups_.insert(own, {layer, std::vector<glm::vec3>(beauty_.size(), glm::vec3(0))});
+  take(own->second, group.beauty_);
 }
 
 void Film::finish() {
@@ -95,53 +99,47 @@ void Film::finish() {
   }
 }
 
-void Film::write(std::span<const PictureTarget> targets, float exposure) const {
-  for (const PictureTarget& target : targets) {
-    if (lower_extension(target.path) == ".exr") {
-      write_exr(target.path);
-    } else {
-      write_png(target, exposure);
-    }
-  }
-}
-
-void Film::write_exr(const std::filesystem::path& target) const {
-  using Kind = ExrLayer::Kind;
-  std::vector<ExrLayer> layers{{"", Kind::colour, false, flatten(beauty_)},
-                               {"direct", Kind::colour, false, flatten(direct_)},
-                               {"indirect", Kind::colour, false, flatten(indirect_)},
-                               {"albedo", Kind::colour, false, flatten(albedo_)},
-                               {"occlusion", Kind::scalar, false, occlusion_},
-                               {"alpha", Kind::scalar, false, alpha_},
-                               {"bent_normal", Kind::vector, true, flatten(bent_normal_)}};
+std::vector<Film::Layer> Film::layers() const {
+  using Kind = ExrLayerType::Kind;
+  std::vector<Layer> layers{{{"", Kind::colour, false}, flat(beauty_)},
+                            {{"direct", Kind::colour, false}, flat(direct_)},
+                            {{"indirect", Kind::colour, false}, flat(indirect_)},
+                            {{"albedo", Kind::colour, false}, flat(albedo_)},
+                            {{"occlusion", Kind::scalar, false}, occlusion_},
+                            {{"alpha", Kind::scalar, false}, alpha_},
+                            {{"bent_normal", Kind::vector, true}, flat(bent_normal_)}};
   if (!occlusion_error_.empty()) {
-    layers.push_back({"occlusion_error", Kind::scalar, true, occlusion_error_});
-    layers.push_back({"irradiance_error", Kind::scalar, true, irradiance_error_});
+    layers.push_back({{"occlusion_error", Kind::scalar, true}, occlusion_error_});
+    layers.push_back({{"irradiance_error", Kind::scalar, true}, irradiance_error_});
   }
   if (!reflection_.empty()) {
-    layers.push_back({"reflection", Kind::colour, false, flatten(reflection_)});
-    layers.push_back({"reflection_occlusion", Kind::scalar, false, reflection_occlusion_});
+    layers.push_back({{"reflection", Kind::colour, false}, flat(reflection_)});
+    layers.push_back({{"reflection_occlusion", Kind::scalar, false}, reflection_occlusion_});
   }
-  for (const auto& [name, shadow] : shadows_) layers.push_back({name, Kind::scalar, false, shadow});
+  for (const auto& [name, shadow] : shadows_)
+    layers.push_back({{name, Kind::scalar, false}, shadow});
   for (const auto& [name, light] : groups_)
-    layers.push_back({name, Kind::colour, false, flatten(light)});
-  ptc::write_exr(target, width_, height_, layers);
+    layers.push_back({{name, Kind::colour, false}, flat(light)});
+  return layers;
 }
 
-void Film::write_png(const PictureTarget& target, float exposure) const {
-  Image image{.width = width_, .height = height_};
-  if (target.layer == "occlusion") {
-    for (const float occlusion : occlusion_) image.pixels.emplace_back(1 - occlusion);
-  } else {
-    image.pixels = target.layer == "direct"       ? direct_
-                   : target.layer == "indirect"   ? indirect_
-                   : target.layer == "albedo"     ? albedo_
-                   : target.layer == "reflection" ? reflection_
-                                                  : beauty_;
-    const float gain = target.layer == "albedo" ? 1 : std::exp2(exposure);
-    for (glm::vec3& pixel : image.pixels) pixel *= gain;
+std::vector<glm::vec3> Film::shown(std::string_view layer, unsigned row, unsigned rows) const {
+  const std::size_t first = std::size_t{row} * width_, count = std::size_t{rows} * width_;
+  std::vector<glm::vec3> pixels;
+  if (layer == "occlusion") {
+    pixels.reserve(count);
+    for (const float occlusion : std::span(occlusion_).subspan(first, count))
+      pixels.emplace_back(1 - occlusion);
+    return pixels;
   }
-  ptc::write_png(target.path, image);
+  const std::vector<glm::vec3>& from = layer == "direct"       ? direct_
+                                       : layer == "indirect"   ? indirect_
+                                       : layer == "albedo"     ? albedo_
+                                       : layer == "reflection" ? reflection_
+                                                               : beauty_;
+  const std::span<const glm::vec3> part = std::span(from).subspan(first, count);
+  pixels.assign(part.begin(), part.end());
+  return pixels;
 }
 
 }  // namespace ptc

@@ -1,9 +1,8 @@
-// The layers of a picture while it is rendered, and the files they are written to.
+// The layers of rows of a picture while these are rendered.
 #pragma once
 
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +11,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "engine/io/image/image.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/shade/shading.h"
@@ -22,13 +22,6 @@ namespace ptc {
 inline constexpr std::array<std::string_view, 6> kPictureLayers{
     "beauty", "direct", "indirect", "occlusion", "albedo", "reflection"};
 
-/// A picture file and the layer that it shows.
-struct PictureTarget {
-  std::filesystem::path path;  ///< an .exr gets all layers, a .png one of them
-  /// Layer of a .png, one of kPictureLayers.
-  std::string layer = "beauty";
-};
-
 /// Layers that a picture has only when they are asked for.
 struct FilmExtras {
   bool estimates = false;            ///< occlusion_error and irradiance_error
@@ -36,11 +29,11 @@ struct FilmExtras {
   std::vector<std::string> shadows;  ///< names of layers of shadows
 };
 
-/// The layers of a picture: weighted means over the samples of every pixel, row 0 at the top.
+/// The layers of some rows of a picture: weighted means over the samples of every pixel.
 /// Memory: pixel_bytes() for each pixel.
 class Film {
  public:
-  /// Makes a black picture.
+  /// Makes black rows.
   /// @param width, height  in pixels
   Film(unsigned width, unsigned height, const FilmExtras& extras);
 
@@ -53,7 +46,7 @@ class Film {
   static constexpr std::uint64_t kGroupBytes = sizeof(glm::vec3);
 
   /// Adds a sample that meets a surface.
-  /// @param pixel   y * width + x
+  /// @param pixel   y * width + x, with y = 0 for the first of the rows
   /// @param weight  share of the sample in its pixel; the samples of a pixel add up to 1
   void add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight);
   /// Adds the estimated error of a sample that meets a surface.
@@ -70,25 +63,30 @@ class Film {
     beauty_[pixel] += weight * radiance;
   }
 
-  /// Adds a picture of what one group of lights brings. Its beauty becomes a layer, light adds up,
-  /// and what all groups have in common is kept.
+  /// Adds rows of what one group of lights brings. Their beauty becomes a layer, light adds up, and
+  /// what all groups have in common is kept.
   /// @param layer  name of the group's layer
-  /// @pre same size, no extras
-  void add_group(const std::string& layer, const Film& group);
+  /// @param first  row of this film where the first row of `group` lies
+  /// @pre same width, no extras
+  void add_group(const std::string& layer, const Film& group, unsigned first);
 
   /// Completes the layers of estimates: mean squares become root mean squares. Nothing can be added
   /// afterwards.
   void finish();
 
-  /// Writes the files one after another, each whole or not at all.
-  /// @param exposure  stops by which a .png of light is brightened; occlusion and albedo stay
-  /// @throws std::system_error
-  void write(std::span<const PictureTarget> targets, float exposure) const;
+  /// A layer of an .exr and its values.
+  struct Layer {
+    ExrLayerType type;
+    std::span<const float> values;  ///< height x width x components
+  };
+  /// Returns all layers, in the order of the file.
+  [[nodiscard]] std::vector<Layer> layers() const;
+  /// Returns the values of a layer of a .png, one of kPictureLayers, in full.
+  /// @param row, rows  the rows of this film that are wanted
+  [[nodiscard]] std::vector<glm::vec3> shown(std::string_view layer, unsigned row,
+                                             unsigned rows) const;
 
  private:
-  void write_exr(const std::filesystem::path& target) const;
-  void write_png(const PictureTarget& target, float exposure) const;
-
   unsigned width_, height_;
   std::vector<glm::vec3> beauty_, direct_, indirect_, bent_normal_, albedo_;
   std::vector<float> occlusion_, alpha_;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -37,17 +38,31 @@ struct PrimaryHit {
   bool sky_included = false;  ///< true when `direct` includes reflected light of the sky
 };
 
+/// A rectangle of the grid of samples of a picture.
+struct SampleRect {
+  unsigned x0 = 0, y0 = 0;  ///< the first column and row
+  unsigned x1 = 0, y1 = 0;  ///< those behind the last
+
+  [[nodiscard]] std::uint64_t samples() const noexcept {
+    return std::uint64_t{x1 - x0} * (y1 - y0);
+  }
+  [[nodiscard]] bool contains(const SampleRect& other) const noexcept {
+    return other.x0 >= x0 && other.x1 <= x1 && other.y0 >= y0 && other.y1 <= y1;
+  }
+};
+
 /// The surfaces that a camera sees. The samples of a pixel lie on a grid of side x side.
 /// Threads: at() may be called concurrently.
 class PrimaryView {
  public:
   virtual ~PrimaryView() = default;
+  /// Finds what the samples of a rectangle see, where the view does not hold all of the picture.
+  /// What at() returns does not depend on the rectangles.
+  virtual void look_at(const SampleRect& /*rect*/) {}
   /// Returns the nearest surface behind a sample; nothing where the camera sees the sky.
-  /// @param x, y  place on the grid of samples, width * side by height * side, (0, 0) top left
+  /// @param x, y  place on the grid of samples, width * side by height * side, (0, 0) top left;
+  ///              in the rectangle of the last look_at(), if the view does not hold all
   [[nodiscard]] virtual std::optional<PrimaryHit> at(unsigned x, unsigned y) const = 0;
-  /// Returns the share of the samples that see a surface so far away that neighbours of them lie
-  /// more than a radius of its surfels apart; 0 where the camera sees no surfels.
-  [[nodiscard]] virtual double sparse_share() const { return 0; }
 };
 
 /// Makes a view that traces rays at a mesh and lights it by shadow rays.
@@ -69,20 +84,41 @@ struct SurfelViewOptions {
   LostPages* lost = nullptr;
   /// Cap of the page cache and of what threads decode. Raised to what these need at least.
   std::uint64_t memory_bytes = std::uint64_t{64} << 20;
+  /// Cap of the depth buffer: where the picture takes more, the view holds a part of it. Raised to
+  /// what the rectangles of look_at() need.
+  std::uint64_t depth_bytes = std::numeric_limits<std::uint64_t>::max();
   BackEnd back_end = BackEnd::pread;
 };
 
+/// The bytes of a sample in the depth buffer of a view of surfels.
+inline constexpr std::uint64_t kSplatBytes = 24;
+
+/// Returns the least depth buffer that serves look_at() of a rectangle of this size.
+/// @param width, height  samples
+[[nodiscard]] std::uint64_t depth_bytes_for(unsigned width, unsigned height) noexcept;
+/// Returns a cap of pages that serves a view of a part of the picture.
+[[nodiscard]] std::uint64_t view_bytes(const ContainerReader& scene, unsigned threads,
+                                       BackEnd back_end);
+
 /// Makes a view of the surfels themselves by rays at their discs: for clouds without a mesh.
 /// PrimaryHit::direct is their baked radiance.
-/// @param progress  advances by one for each sample
+/// @param scene, executor  must outlive a view that does not hold all of the picture
+/// @param progress         advances by one for each sample, if the view holds them all
 /// @throws FormatError when a page is damaged and `lost` is null, or that of the octree's root;
 ///         std::system_error
-/// Memory: 24 bytes for each sample; while it is made, SurfelViewOptions::memory_bytes.
+/// Memory: SurfelViewOptions::depth_bytes or less, kSplatBytes for each sample that it holds;
+///         while it is made, and as long as it holds but a part, SurfelViewOptions::memory_bytes.
 [[nodiscard]] std::unique_ptr<PrimaryView> view_surfels(const ContainerReader& scene,
                                                         const Camera& camera,
                                                         const SurfelViewOptions& options,
                                                         const Executor& executor,
                                                         Progress& progress);
+
+/// Returns the share of the samples of such a view that see a surface so far away that neighbours
+/// of them lie more than a radius of its surfels apart. Of up to 16 x 16 samples one is looked at.
+/// @throws as view_surfels()
+[[nodiscard]] double sparse_share(const ContainerReader& scene, const Camera& camera,
+                                  const SurfelViewOptions& options, const Executor& executor);
 
 /// Makes a view of other surfels in the frame of a scene, such as clusters of its octree, drawn as
 /// discs into a depth buffer of 24 bytes a sample.

@@ -28,9 +28,7 @@
 namespace ptc {
 namespace {
 
-// Bytes of a sample in the depth buffer of view_surfels(), of a pixel of a tile (hit, receiver,
-// result, order), and of what estimates add to that pixel
-constexpr std::uint64_t kSplatBytes = 24;
+// Bytes of a pixel of a tile (hit, receiver, result, order), and of what estimates add to it
 constexpr std::uint64_t kReceiverBytes = 320;
 constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);
 
@@ -131,18 +129,43 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
                 lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
 }
 
+/// The memory of a view of surfels.
+struct SurfelViewBytes {
+  std::uint64_t depth = 0;  ///< of its depth buffer
+  /// Of its pages as long as it lives; 0: it holds the whole picture, and its pages are those of a
+  /// gather that does not live yet.
+  std::uint64_t pages = 0;
+};
+
+/// Returns the memory of the view of a subject: a quarter of the cap may be a depth buffer of the
+/// whole picture.
+SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,
+                                  std::uint64_t cap) {
+  const std::uint64_t all = subject.samples() * kSplatBytes;
+  if (all <= cap / 4) return {all, 0};
+  const Tile tile = TileRenderer::tile_of(subject.camera.width, subject.side);
+  const std::uint64_t least =
+      depth_bytes_for(tile.width * subject.side, tile.height * subject.side);
+  return {std::max(cap / 4, least),
+          view_bytes(lighting.scene(), lighting.executor().threads(), lighting.back_end())};
+}
+
 /// Makes a view of the scene's surfels.
-void make_surfel_view(Subject& subject, float lift, const Lighting& lighting,
-                      LightingReport& report, Progress& progress) {
+/// @param sparse  becomes whether its samples lie far apart (spec/shading.md#sparse-pictures)
+void make_surfel_view(Subject& subject, float lift, const SurfelViewBytes& bytes,
+                      const Lighting& lighting, LightingReport& report, bool& sparse,
+                      Progress& progress) {
   const ContainerReader& scene = lighting.scene();
   const Stage stage(report.seconds, progress, "view", subject.samples(), "samples");
-  subject.view = view_surfels(scene, subject.camera,
-                              {.side = subject.side,
-                               .lift = lift,
-                               .lost = lighting.lost(),
-                               .memory_bytes = lighting.cache_bytes(),
-                               .back_end = lighting.back_end()},
-                              lighting.executor(), progress);
+  SurfelViewOptions options{.side = subject.side,
+                            .lift = lift,
+                            .lost = lighting.lost(),
+                            .memory_bytes = lighting.cache_bytes(),
+                            .depth_bytes = bytes.depth,
+                            .back_end = lighting.back_end()};
+  sparse = sparse_share(scene, subject.camera, options, lighting.executor()) > 0.5;
+  if (bytes.pages > 0) options.memory_bytes = bytes.pages;
+  subject.view = view_surfels(scene, subject.camera, options, lighting.executor(), progress);
   return_freed_memory();
 }
 
@@ -152,20 +175,38 @@ FilmExtras extras_of(const RenderRequest& request) {
   return extras;
 }
 
+/// Returns what an .exr says of the layers of films.
+std::vector<ExrLayerType> layer_types(const Film& film) {
+  std::vector<ExrLayerType> types;
+  for (const Film::Layer& layer : film.layers()) types.push_back(layer.type);
+  return types;
+}
+
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
-MemoryBudget picture_budget(const RenderRequest& request, const Part& part,
-                            const Subject& subject) {
+/// @param view  of the surfels, if the subject has no mesh
+MemoryBudget picture_budget(const RenderRequest& request, std::span<const PictureTarget> targets,
+                            const Part& part, const Subject& subject, const SurfelViewBytes& view) {
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
   const bool glossy = request.glossy.roughness.has_value();
   const std::uint64_t receiver =
       kReceiverBytes + (request.estimate ? kEstimateBytes : 0) + (glossy ? sizeof(Reflection) : 0);
   budget.charge("a tile", TileRenderer::kSamplesAtOnce * receiver);
-  budget.charge("the picture",
-                subject.pixels() * (Film::pixel_bytes(extras_of(request)) + part.held_bytes));
+  const FilmExtras extras = extras_of(request);
+  const Camera& camera = subject.camera;
+  const unsigned rows =
+      std::min(camera.height, TileRenderer::tile_of(camera.width, subject.side).height);
+  budget.charge("rows of the picture", Film::pixel_bytes(extras) * camera.width * rows);
+  if (part.held_bytes > 0) {
+    budget.charge("the picture of all groups", subject.pixels() * part.held_bytes);
+  } else {
+    budget.charge("the files of the picture",
+                  PictureFiles::bytes(targets, camera.width, layer_types(Film(1, 1, extras))));
+  }
   if (subject.rays) {
     charge_mesh(budget, subject.mesh, subject.rays.get());
   } else {
-    budget.charge("the depth buffer", subject.samples() * kSplatBytes);
+    budget.charge("the depth buffer", view.depth);
+    if (view.pages > 0) budget.charge("pages that the camera sees", view.pages);
   }
   return budget;
 }
@@ -185,24 +226,28 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
 
   // Find what the windows see, in twice as many as are wanted: some may see nothing
   std::vector<Pilot> pilots(2 * plan.count);
-  executor.for_each(pilots.size(), [&](std::size_t i, unsigned) {
+  for (std::size_t i = 0; i < pilots.size(); ++i) {
     const auto place = [&](int axis, unsigned room) {
       const double turn = kGolden[axis] * static_cast<double>(i + 1);
       return static_cast<unsigned>((turn - std::floor(turn)) * (room + 1.0));
     };
     const unsigned x0 = place(0, camera.width - width), y0 = place(1, camera.height - height);
     pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
-    for (unsigned y = y0; y < y0 + height; ++y) {
+    subject.view->look_at(samples_of({x0, y0, width, height}, side));
+    std::vector<std::optional<PrimaryHit>> hits(std::size_t{width} * height);
+    executor.for_each(height, [&](std::size_t row, unsigned) {
       for (unsigned column = 0; column < width; ++column) {
         // Begin each row elsewhere, so that those that are compared lie all over the window
+        const auto y = y0 + static_cast<unsigned>(row);
         const unsigned x = x0 + (column + width / 2 + 5 * (y - y0)) % width;
         const auto [sx, sy] = sample_at(x, y, pilots[i].variant, side);
-        if (const auto hit = subject.view->at(sx, sy)) {
-          pilots[i].receivers.push_back(receiver_at(*hit));
-        }
+        hits[row * width + column] = subject.view->at(sx, sy);
       }
+    });
+    for (const auto& hit : hits) {
+      if (hit) pilots[i].receivers.push_back(receiver_at(*hit));
     }
-  });
+  }
 
   // Keep the first ones that see something
   std::erase_if(pilots, [](const Pilot& pilot) { return pilot.receivers.empty(); });
@@ -275,11 +320,12 @@ void check_request(const RenderRequest& request, std::span<const PictureTarget> 
   static_cast<void>(side_of(request.samples));
 }
 
+/// Gets complete rows of the picture that a camera sees, from the top down.
+using RowsSeen = std::function<void(const Film& rows, unsigned first, const Camera& camera)>;
+
 /// Renders a container.
-/// @param done  gets the film when all samples are in it
 LightingReport render_part(const RenderRequest& request, std::span<const PictureTarget> targets,
-                           const Part& part, const std::function<void(Film&)>& done,
-                           Progress& progress) {
+                           const Part& part, const RowsSeen& done, Progress& progress) {
   // Open the scene and load what the camera sees
   LightingReport report;
   Subject subject{.side = side_of(request.samples)};
@@ -293,7 +339,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   const std::vector<LightRig> rigs = rigs_of_groups(lights, request.shadows);
 
   // Divide the memory, shade earlier bounces, choose the settings
-  MemoryBudget budget = picture_budget(request, part, subject);
+  const SurfelViewBytes view = surfel_view_bytes(subject, lighting, request.run.memory_bytes);
+  MemoryBudget budget = picture_budget(request, targets, part, subject, view);
   if (sees_mesh) {
     for (const LightRig& rig : rigs)
       subject.shadows.of_mesh.push_back(std::make_unique<DirectLight>(*subject.rays, rig));
@@ -309,20 +356,22 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
     subject.shadows.of_surfels = std::make_unique<DiscShadows>(
         lighting.scene(), rigs, request.gather.sides, request.back_end, lighting.executor());
   }
-  if (!sees_mesh) make_surfel_view(subject, request.lift, lighting, report, progress);
-  Film film(subject.camera.width, subject.camera.height, extras_of(request));
-  const bool sparse = !sees_mesh && subject.view->sparse_share() > 0.5;
+  bool sparse = false;
+  if (!sees_mesh) {
+    make_surfel_view(subject, request.lift, view, lighting, report, sparse, progress);
+  }
   lighting.tune([&] { return pilots_of(subject, lighting.executor()); }, sparse);
 
-  // Render all samples into the film
+  // Render all samples
   {
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
     TileRenderer({.camera = subject.camera, .side = subject.side, .view = *subject.view},
-                 subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting, film)
-        .render_all(progress);
+                 subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting)
+        .render_all(
+            extras_of(request),
+            [&](const Film& rows, unsigned first) { done(rows, first, subject.camera); }, progress);
   }
-  lighting.finish();  // frees the page cache, so that there is room for copies of the layers
-  done(film);
+  lighting.finish();
 
   // Compare some of the pixels with rays
   const unsigned area_rays = lit_by_emitters(lighting.scene()) ? 1 : 0;
@@ -361,17 +410,19 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     // Render it, and add the picture to the sum
     one.run = request.run;
     one.scene = lit.path();
-    const auto add = [&](const Film& film) {
+    const auto add = [&](const Film& rows, unsigned first, const Camera& camera) {
       if (!sum) {
-        sum = std::make_unique<Film>(film.width(), film.height(), FilmExtras{});
-        held += sum_bytes * film.width() * film.height();
+        sum = std::make_unique<Film>(camera.width, camera.height, FilmExtras{});
+        held += sum_bytes * camera.width * camera.height;
       }
-      sum->add_group(group_channel(group), film);
+      sum->add_group(group_channel(group), rows, first);
     };
     const Part part{.emission = rest, .held_bytes = sum_bytes};
     add_costs(report, render_part(one, targets, part, add, progress));
   }
-  sum->write(targets, request.exposure);
+  PictureFiles files(targets, sum->width(), sum->height(), layer_types(*sum), request.exposure);
+  files.write(*sum);
+  files.publish();
   return report;
 }
 
@@ -379,13 +430,15 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
 LightingReport render_container(const RenderRequest& request,
                                 std::span<const PictureTarget> targets, Progress& progress) {
   if (request.light_groups) return render_groups(request, targets, progress);
-  return render_part(
-      request, targets, {},
-      [&](Film& film) {
-        film.finish();
-        film.write(targets, request.exposure);
-      },
-      progress);
+  std::optional<PictureFiles> files;
+  const auto write = [&](const Film& rows, unsigned first, const Camera& camera) {
+    if (!files) {
+      files.emplace(targets, camera.width, camera.height, layer_types(rows), request.exposure);
+    }
+    files->write(rows);
+    if (first + rows.height() == camera.height) files->publish();
+  };
+  return render_part(request, targets, {}, write, progress);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/light/lighting.h"
-#include "engine/pipeline/render/film.h"
+#include "engine/pipeline/render/picture_files.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 

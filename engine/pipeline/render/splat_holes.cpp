@@ -19,8 +19,9 @@ namespace {
 constexpr int kMaxReach = 64;    // samples; wider gaps are not closed
 constexpr unsigned kBlock = 16;  // samples along the side of a block
 constexpr int kPasses = 3;       // holes beside holes take more than one
-constexpr float kReach = 4;      // radii of the disc: points at random leave such gaps
-constexpr float kInFront = 3;    // radii by which a surface is nearer than what shows through it
+static_assert(kHoleReach == kPasses * kMaxReach);
+constexpr float kReach = 4;    // radii of the disc: points at random leave such gaps
+constexpr float kInFront = 3;  // radii by which a surface is nearer than what shows through it
 constexpr float kInFrontOfBack = 1;    // the same where the back of a disc shows
 constexpr float kBand = 12;            // radii by which depths of one surface differ around a hole
 constexpr std::size_t kLeastHits = 7;  // of eight directions

@@ -42,6 +42,9 @@ struct SplatPicture {
   SceneScale scale;
 };
 
+/// The distance within which samples decide about a hole, rows or columns of samples.
+inline constexpr unsigned kHoleReach = 192;
+
 /// Closes holes between discs, through which the background or a farther surface shows.
 ///
 /// A sample is in a hole of a surface when it is surrounded by that surface within four radii of
@@ -53,6 +56,7 @@ struct SplatPicture {
 /// as the distance between points are closed, and wider ones, which the scan resolves, stay: points
 /// that lie at random leave a fraction of a percent of a surface farther than two radii from the
 /// next.
+/// What becomes of a sample depends on those that are at most kHoleReach rows and columns away.
 /// @return the number of samples that were closed
 std::size_t close_holes(const SplatPicture& picture, const Executor& executor);
 

@@ -36,6 +36,7 @@ class DrawnView : public SplatView {
 
   /// Draws the surfels of a source.
   void draw(PointSource& source, const Executor& executor) {
+    begin(whole());
     std::vector<Surfel> block(1 << 14);
     while (const std::size_t count = source.next(block)) {
       std::vector<std::vector<Projected>> discs(1);
@@ -115,7 +116,7 @@ class DrawnView : public SplatView {
         if (!(t > 0 && distance < square)) continue;
         // Let the nearest centre win where coplanar discs overlap, as in the gather
         const float bumped = t + 0.01F / disc.radius * distance;
-        SplatSample& sample = samples_[std::size_t{y} * width_ + x];
+        SplatSample& sample = samples_[place_of(x, y)];
         if (bumped < sample.depth) sample = {bumped, disc.payload};
       }
     }
@@ -131,21 +132,29 @@ SplatView::SplatView(const ContainerReader& scene, const Camera& camera, unsigne
       width_(camera.width * side),
       height_(camera.height * side),
       lift_(lift),
-      sky_included_(!sky_is_gathered(scene)),
-      samples_(std::size_t{width_} * height_) {
+      sky_included_(!sky_is_gathered(scene)) {
   const CameraAxes axes = axes_of(camera);
   axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
   focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
 }
 
+void SplatView::begin(const SampleRect& area) {
+  area_ = area;
+  samples_.assign(area.samples(), {});
+}
+
 void SplatView::finish(const Executor& executor) {
-  close_holes(
-      {.samples = samples_, .width = width_, .height = height_, .focal = focal_, .scale = scale_},
-      executor);
+  static_assert(sizeof(SplatSample) <= kSplatBytes);
+  close_holes({.samples = samples_,
+               .width = area_.x1 - area_.x0,
+               .height = area_.y1 - area_.y0,
+               .focal = focal_,
+               .scale = scale_},
+              executor);
 }
 
 std::optional<PrimaryHit> SplatView::at(unsigned x, unsigned y) const {
-  const SplatSample& s = samples_[std::size_t{y} * width_ + x];
+  const SplatSample& s = samples_[place_of(x, y)];
   if (s.empty()) return std::nullopt;
   const glm::vec3 along = axes_ * ray(x, y);
   const std::array<float, 3> n = decode_octahedral(s.payload.normal[0], s.payload.normal[1]);
@@ -166,18 +175,6 @@ std::optional<PrimaryHit> SplatView::at(unsigned x, unsigned y) const {
   // The radiance is that of the front; a back has only what is gathered at it
   if (!back) hit.direct = glm::vec3(radiance[0], radiance[1], radiance[2]);
   return hit;
-}
-
-double SplatView::sparse_share() const {
-  constexpr float kSparse = 1;  // radii
-  std::size_t seen = 0, sparse = 0;
-  for (const SplatSample& sample : samples_) {
-    if (sample.empty()) continue;
-    ++seen;
-    const float radius = scale_.radius(decode_ufloat16(sample.payload.radius));
-    if (sample.depth > kSparse * radius * focal_) ++sparse;
-  }
-  return seen == 0 ? 0 : static_cast<double>(sparse) / static_cast<double>(seen);
 }
 
 SplatPayload SplatView::payload_of(const Surfel& surfel, float rise) {

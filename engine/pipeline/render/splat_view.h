@@ -31,15 +31,22 @@ namespace ptc {
 ///                              k
 class SplatView : public PrimaryView {
  public:
-  /// @param lift  as for view_surfels()
+  /// Makes a view without a depth buffer. @param lift  as for view_surfels()
   SplatView(const ContainerReader& scene, const Camera& camera, unsigned side, float lift);
 
   [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override;
-  [[nodiscard]] double sparse_share() const override;
 
  protected:
-  /// Closes the holes between the discs. To be called once, when the depth buffer is full.
+  /// Empties the depth buffer for another part of the picture.
+  void begin(const SampleRect& area);
+  /// Closes the holes between the discs. To be called when the depth buffer is full.
   void finish(const Executor& executor);
+  /// Returns the rectangle of the whole picture.
+  [[nodiscard]] SampleRect whole() const noexcept { return {0, 0, width_, height_}; }
+  /// Returns the place of a sample in the depth buffer.
+  [[nodiscard]] std::size_t place_of(unsigned x, unsigned y) const noexcept {
+    return std::size_t{y - area_.y0} * (area_.x1 - area_.x0) + (x - area_.x0);
+  }
   /// Returns the ray of a sample in the camera's axes, with z = 1.
   [[nodiscard]] glm::vec3 ray(unsigned x, unsigned y) const {
     return {(static_cast<float>(x) + 0.5F - 0.5F * static_cast<float>(width_)) / focal_,
@@ -52,8 +59,9 @@ class SplatView : public PrimaryView {
   glm::dvec3 position_;  ///< of the eye, scene units
   Frame frame_;
   SceneScale scale_;
-  glm::mat3 axes_{1};  ///< columns: right, down, forward
-  unsigned width_, height_;
+  glm::mat3 axes_{1};        ///< columns: right, down, forward
+  unsigned width_, height_;  ///< of the whole picture, samples
+  SampleRect area_;          ///< that the depth buffer covers
   float lift_;
   bool sky_included_;  ///< in the radiance of the surfels
   float focal_ = 1;    ///< in samples

@@ -22,26 +22,46 @@ std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample, unsig
   return {x * side + sample % side, y * side + sample / side};
 }
 
-void TileRenderer::render_all(Progress& progress) {
-  constexpr unsigned kMaxVariantSide = 4, kTileSide = 256;
+SampleRect samples_of(const Tile& tile, unsigned side) {
+  return {tile.x0 * side, tile.y0 * side, (tile.x0 + tile.width) * side,
+          (tile.y0 + tile.height) * side};
+}
+
+Tile TileRenderer::tile_of(unsigned width, unsigned side) noexcept {
+  constexpr unsigned kMaxVariantSide = 4, kTileSide = 256, kLeastRows = 8;
+  constexpr std::uint64_t kStripPixels = std::uint64_t{1} << 19;
   static_assert(kMaxVariantSide * kMaxVariantSide == kMaxVariants);
   static_assert(kTileSide * kTileSide == kSamplesAtOnce);
+  Tile tile{0, 0, kTileSide / std::min(side, kMaxVariantSide), 0};
+  tile.height = tile.width;
+  while (tile.height > kLeastRows && std::uint64_t{width} * tile.height > kStripPixels) {
+    tile.width *= 2;
+    tile.height /= 2;
+  }
+  return tile;
+}
+
+void TileRenderer::render_all(const FilmExtras& extras, const RowsDone& done, Progress& progress) {
   const Camera& camera = seen_.camera;
   const unsigned samples = seen_.side * seen_.side;
   const unsigned at_once = std::min(samples, kMaxVariants);
-  const unsigned side = kTileSide / std::min(seen_.side, kMaxVariantSide);
-  for (unsigned y = 0; y < camera.height; y += side) {
-    for (unsigned x = 0; x < camera.width; x += side) {
-      const Tile tile{x, y, std::min(camera.width - x, side), std::min(camera.height - y, side)};
+  const Tile whole = tile_of(camera.width, seen_.side);
+  for (unsigned y = 0; y < camera.height; y += whole.height) {
+    Film film(camera.width, std::min(camera.height - y, whole.height), extras);
+    for (unsigned x = 0; x < camera.width; x += whole.width) {
+      const Tile tile{x, y, std::min(camera.width - x, whole.width), film.height()};
       for (unsigned first = 0; first < samples; first += at_once)
-        render(tile, first, std::min(at_once, samples - first), progress);
+        render(tile, first, std::min(at_once, samples - first), film, progress);
     }
+    film.finish();
+    done(film, y);
   }
 }
 
 /// Renders some samples of each pixel of a tile.
 /// @param first  number of the first one, 0 to side^2 - 1
-void TileRenderer::render(const Tile& tile, unsigned first, unsigned count, Progress& progress) {
+void TileRenderer::render(const Tile& tile, unsigned first, unsigned count, Film& film,
+                          Progress& progress) {
   find_hits(tile, first, count);
   receivers_.clear();
   std::vector<std::size_t> counts(count);
@@ -52,11 +72,12 @@ void TileRenderer::render(const Tile& tile, unsigned first, unsigned count, Prog
   }
   LitReceivers lit = lighting_.shade(receivers_, counts);
   lit.shadows = find_shadows();
-  expose(tile, first, lit);
+  expose(tile, first, lit, film);
   progress.advance(hits_.size() - receivers_.size());
 }
 
 void TileRenderer::find_hits(const Tile& tile, unsigned first, unsigned count) {
+  seen_.view.look_at(samples_of(tile, seen_.side));
   hits_.assign(tile.pixels() * count, std::nullopt);
   lighting_.executor().for_each(std::size_t{tile.height} * count, [&](std::size_t i, unsigned) {
     const auto row = static_cast<unsigned>(i % tile.height),
@@ -88,7 +109,7 @@ std::span<const float> TileRenderer::find_shadows() {
   return shadows_;
 }
 
-void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& lit) {
+void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& lit, Film& film) {
   const unsigned side = seen_.side;
   const float weight = 1.0f / static_cast<float>(side * side);
   const float scale = 1.0f / static_cast<float>(side);
@@ -98,18 +119,18 @@ void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& 
     const std::size_t place = i % tile.pixels();
     const unsigned x = tile.x0 + static_cast<unsigned>(place % tile.width);
     const unsigned y = tile.y0 + static_cast<unsigned>(place / tile.width);
-    const std::size_t pixel = std::size_t{y} * seen_.camera.width + x;
+    const std::size_t pixel = std::size_t{y - tile.y0} * film.width() + x;
     if (hits_[i]) {
-      if (!lit.estimates.empty()) film_.add(pixel, lit.estimates[next], weight);
-      if (!lit.reflections.empty()) film_.add(pixel, lit.reflections[next], weight);
-      film_.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
-      film_.add(pixel, *hits_[i], lit.shading[next++], weight);
+      if (!lit.estimates.empty()) film.add(pixel, lit.estimates[next], weight);
+      if (!lit.reflections.empty()) film.add(pixel, lit.reflections[next], weight);
+      film.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
+      film.add(pixel, *hits_[i], lit.shading[next++], weight);
     } else {
       const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
       const auto [sx, sy] = sample_at(x, y, sample, side);
       const glm::vec3 direction = seen_.camera.direction((static_cast<float>(sx) + 0.5f) * scale,
                                                          (static_cast<float>(sy) + 0.5f) * scale);
-      film_.add_sky(pixel, sky_.at(direction), weight);
+      film.add_sky(pixel, sky_.at(direction), weight);
     }
   }
 }

@@ -1,9 +1,10 @@
-// Renders a picture into a film, tile by tile.
+// Renders a picture, tile by tile, into films of some rows.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -24,7 +25,7 @@ namespace ptc {
 struct SeenThrough {
   const Camera& camera;
   unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
-  const PrimaryView& view;
+  PrimaryView& view;
 };
 
 /// The shadows of groups of lights that a picture shows: those of a mesh or those of surfels, or
@@ -42,6 +43,20 @@ struct PictureShadows {
 [[nodiscard]] std::array<unsigned, 2> sample_at(unsigned x, unsigned y, unsigned sample,
                                                 unsigned side);
 
+/// A rectangle of pixels.
+struct Tile {
+  unsigned x0, y0, width, height;
+  [[nodiscard]] std::size_t pixels() const { return std::size_t{width} * height; }
+};
+
+/// Returns the samples of the pixels of a tile.
+/// @param side  samples along the side of a pixel
+[[nodiscard]] SampleRect samples_of(const Tile& tile, unsigned side);
+
+/// Gets the layers of complete rows of a picture.
+/// @param first  the first of the rows
+using RowsDone = std::function<void(const Film& rows, unsigned first)>;
+
 /// Renders all samples of a picture. Each sample of a pixel is shaded with a variant of its own, so
 /// that what one of them resolves too coarsely averages out over the others.
 class TileRenderer {
@@ -51,41 +66,38 @@ class TileRenderer {
   /// The most samples that are shaded in one go.
   static constexpr std::uint64_t kSamplesAtOnce = std::uint64_t{1} << 16;
 
+  /// Returns the size of the tiles of a picture, which does not depend on the memory cap; those at
+  /// the right and lower borders are cut off there. One row of tiles is in memory at once: the
+  /// wider the picture, the lower they are.
+  /// @param width  of the picture, pixels
+  /// @param side   samples along the side of a pixel
+  [[nodiscard]] static Tile tile_of(unsigned width, unsigned side) noexcept;
+
   /// All but `seen` must outlive this.
   /// @param sun_rays  shadow rays of a hit on a mesh for each sun, where shadows are asked for
   /// @param lighting  tuned
   TileRenderer(const SeenThrough& seen, const PictureShadows& shadows, unsigned sun_rays,
-               const Sky& sky, Lighting& lighting, Film& film)
-      : seen_(seen),
-        casters_(shadows),
-        sun_rays_(sun_rays),
-        sky_(sky),
-        lighting_(lighting),
-        film_(film) {}
+               const Sky& sky, Lighting& lighting)
+      : seen_(seen), casters_(shadows), sun_rays_(sun_rays), sky_(sky), lighting_(lighting) {}
 
-  /// Adds all samples to the film.
+  /// Renders all samples, one row of tiles after another.
+  /// @param extras    of the films
+  /// @param done      gets each row of tiles, from the top of the picture down
   /// @param progress  advances by one for each sample
-  /// @throws as Lighting::shade()
-  void render_all(Progress& progress);
+  /// @throws as Lighting::shade(), and what `done` throws
+  void render_all(const FilmExtras& extras, const RowsDone& done, Progress& progress);
 
  private:
-  /// A rectangle of pixels.
-  struct Tile {
-    unsigned x0, y0, width, height;
-    [[nodiscard]] std::size_t pixels() const { return std::size_t{width} * height; }
-  };
-
-  void render(const Tile& tile, unsigned first, unsigned count, Progress& progress);
+  void render(const Tile& tile, unsigned first, unsigned count, Film& film, Progress& progress);
   void find_hits(const Tile& tile, unsigned first, unsigned count);
   [[nodiscard]] std::span<const float> find_shadows();
-  void expose(const Tile& tile, unsigned first, const LitReceivers& lit);
+  void expose(const Tile& tile, unsigned first, const LitReceivers& lit, Film& film);
 
   SeenThrough seen_;
   const PictureShadows& casters_;
   unsigned sun_rays_;
   const Sky& sky_;
   Lighting& lighting_;
-  Film& film_;
   std::vector<std::optional<PrimaryHit>> hits_;
   std::vector<Receiver> receivers_;
   std::vector<float> shadows_;
