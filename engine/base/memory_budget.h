@@ -26,6 +26,11 @@ class MemoryBudget {
   ///         and every part of it
   [[nodiscard]] std::uint64_t rest(const std::string& part, std::uint64_t min_bytes) const;
 
+  /// Returns the bytes of the cap that are not charged yet; 0 when more is charged.
+  [[nodiscard]] std::uint64_t left() const noexcept {
+    return cap_ > charged_ ? cap_ - charged_ : 0;
+  }
+
   /// Checks that the charges do not exceed the cap. @throws LimitError as rest() does
   void require() const { static_cast<void>(rest({}, 0)); }
 

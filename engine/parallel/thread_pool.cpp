@@ -90,9 +90,12 @@ void require_threads(unsigned threads) {
 
 }  // namespace
 
-ThreadPool::ThreadPool(unsigned threads)
-    : threads_(threads == 0 ? std::max(1U, std::thread::hardware_concurrency()) : threads) {
-  require_request(threads_ <= kMaxThreads, "run.threads", "`run.threads` is not 0 to 4096");
+unsigned ThreadPool::count(unsigned threads) {
+  require_request(threads <= kMaxThreads, "run.threads", "`run.threads` is not 0 to 4096");
+  return threads == 0 ? std::max(1U, std::thread::hardware_concurrency()) : threads;
+}
+
+ThreadPool::ThreadPool(unsigned threads) : threads_(count(threads)) {
   if (threads_ == 1) return;
   require_threads(threads_ - 1);
   arena_ = std::make_unique<TbbArena>(threads_);

@@ -21,6 +21,10 @@ class ThreadPool final : public Executor {
   explicit ThreadPool(unsigned threads = 0);
   ~ThreadPool() override;
 
+  /// Returns the number of threads of a pool that is made with `threads`.
+  /// @throws RequestError as the constructor does
+  [[nodiscard]] static unsigned count(unsigned threads);
+
   [[nodiscard]] unsigned threads() const noexcept override { return threads_; }
   void for_each(std::size_t count,
                 const std::function<void(std::size_t index, unsigned thread)>& body) const override;

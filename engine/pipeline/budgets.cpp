@@ -4,6 +4,9 @@
 #include <set>
 #include <utility>
 
+#include "engine/base/error.h"
+#include "engine/parallel/thread_pool.h"
+#include "engine/scene/sampling/mesh_parts.h"
 #include "engine/trace/disc_tracer.h"
 
 namespace ptc {
@@ -26,6 +29,17 @@ MemoryBudget budget_of(std::uint64_t cap_bytes, std::string job) {
   return budget;
 }
 
+ThreadsThatFit threads_that_fit(const RunOptions& run,
+                                const std::function<std::uint64_t(unsigned threads)>& left) {
+  for (unsigned threads = ThreadPool::count(run.threads);; --threads) {
+    try {
+      return {threads, left(threads)};
+    } catch (const LimitError&) {
+      if (threads == 1) throw;
+    }
+  }
+}
+
 void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
   budget.charge(
       "the directory of " + container.path().filename().string(),
@@ -33,9 +47,7 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
 }
 
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
-  const std::uint64_t triangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]);
-  const std::uint64_t vertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
-  budget.charge("the mesh", mesh.triangles.size() * triangle + mesh.positions.size() * vertex);
+  budget.charge("the mesh", bytes_of(mesh));
   std::set<const Image*> textures{nullptr};
   std::uint64_t pixels = 0;
   for (const Material& material : mesh.materials) {

@@ -6,10 +6,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 
 #include "engine/base/memory_budget.h"
 #include "engine/cache/page_cache.h"
 #include "engine/io/mesh/mesh.h"
+#include "engine/pipeline/run.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/store/reader.h"
 
@@ -19,11 +21,23 @@ namespace ptc {
 inline constexpr std::uint64_t kBufferBytes = std::uint64_t{32} << 20;
 
 /// Minimum of bytes that the sort of a build is given.
-inline constexpr std::uint64_t kMinSortBytes = std::uint64_t{48} << 20;
+inline constexpr std::uint64_t kMinSortBytes = std::uint64_t{32} << 20;
 
 /// Returns a budget to which kBufferBytes are already charged.
 /// @param job  what the memory is for, as in "the memory cap is too small for shading"
 [[nodiscard]] MemoryBudget budget_of(std::uint64_t cap_bytes, std::string job);
+
+/// The threads of a run, and the memory that they leave.
+struct ThreadsThatFit {
+  unsigned threads = 1;
+  std::uint64_t bytes = 0;  ///< what `left` returned
+};
+
+/// Finds how many of a run's threads fit under its cap.
+/// @param left  returns the memory that a number of threads leave, or throws LimitError
+/// @throws LimitError when not even one thread fits; it is that of one thread
+[[nodiscard]] ThreadsThatFit threads_that_fit(
+    const RunOptions& run, const std::function<std::uint64_t(unsigned threads)>& left);
 
 /// Charges the directory that an open container keeps in memory.
 void charge_directory(MemoryBudget& budget, const ContainerReader& container);

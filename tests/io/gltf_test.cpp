@@ -345,7 +345,7 @@ TEST_CASE("gltf: a file that several buffers name is read once", "[io][gltf]") {
   json["bufferViews"][1]["buffer"] = 1;
   json["bufferViews"][2]["buffer"] = 2;
   const std::string text = json.dump();
-  GltfDocument document(files.scratch.file("a.gltf", text));
+  GltfDocument document(files.scratch.file("a.gltf", text), text.size() << 10);
   for (std::uint64_t view = 0; view < 3; ++view) static_cast<void>(document.view(view));
   CHECK(document.bytes_read() == text.size() + 68);
   CHECK(files.read(json).mesh.triangles.size() == 1);

@@ -13,6 +13,7 @@
 #include "engine/io/mesh/gltf_document.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -21,7 +22,6 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/io/file/file.h"
 
 namespace ptc {
 namespace {
@@ -31,13 +31,7 @@ static_assert(std::endian::native == std::endian::little, "glTF buffers are litt
 constexpr std::uint32_t kGlbMagic = 0x46546c67;  // "glTF"
 constexpr std::uint32_t kJsonChunk = 0x4e4f534a;
 constexpr std::uint32_t kBinaryChunk = 0x004e4942;
-
-std::vector<std::byte> read_file(const std::filesystem::path& path) {
-  const InputFile file(path);
-  std::vector<std::byte> bytes(file.size());
-  file.read_at(0, bytes);
-  return bytes;
-}
+constexpr int kMaxDepth = 128;  // of nested arrays and objects
 
 std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -128,6 +122,12 @@ double load(const std::byte* from, std::uint64_t type) {
   }
 }
 
+// Refuses a document whose JSON takes more memory than there is.
+[[noreturn]] void refuse_room(const std::filesystem::path& path, std::uint64_t bytes) {
+  throw LimitError(path.string() + ": its JSON does not fit in `run.memory_bytes`: it takes " +
+                   std::to_string((bytes >> 20) + 1) + " MiB or more");
+}
+
 // Returns the numbers in an element of a type, or 0 for matrices and unknown types.
 std::size_t components_of(const std::string& type) {
   if (type == "SCALAR") return 1;
@@ -138,13 +138,15 @@ std::size_t components_of(const std::string& type) {
 
 }  // namespace
 
-GltfDocument::GltfDocument(const std::filesystem::path& path) : path_(path) {
-  const std::vector<std::byte> file = read_file(path);
-  bytes_read_ = file.size();
-  if (file.size() >= 12 && u32_at(file, 0) == kGlbMagic) {
-    read_chunks(file);
+GltfDocument::GltfDocument(const std::filesystem::path& path, std::uint64_t memory_bytes)
+    : path_(path), file_(path) {
+  bytes_read_ = file_.size();
+  std::array<std::byte, 4> magic{};
+  if (file_.size() >= 12) file_.read_at(0, magic);
+  if (u32_at(magic, 0) == kGlbMagic) {
+    read_chunks(memory_bytes);
   } else {
-    parse(file);
+    parse(read_text(0, file_.size(), memory_bytes), memory_bytes);
   }
   buffers_.resize(count("buffers"));
 }
@@ -153,10 +155,30 @@ void GltfDocument::fail(const std::string& rule) const {
   throw DataError(path_.string() + ": " + rule);
 }
 
-void GltfDocument::parse(std::span<const std::byte> text) {
+// Reads the JSON of the file, if there is room for it.
+std::vector<std::byte> GltfDocument::read_text(std::uint64_t offset, std::uint64_t length,
+                                               std::uint64_t memory_bytes) const {
+  if (length > memory_bytes) refuse_room(path_, length);
+  std::vector<std::byte> text(length);
+  file_.read_at(offset, text);
+  return text;
+}
+
+void GltfDocument::parse(const std::vector<std::byte>& text, std::uint64_t memory_bytes) {
+  // Count values while they are read, so that nested arrays do not fill the memory first
+  constexpr std::uint64_t kValueBytes = 96;  // of a member of an object, its key included
+  std::uint64_t bytes = text.size();
+  const auto watch = [&](int depth, Json::parse_event_t event, Json& /*parsed*/) {
+    if (depth > kMaxDepth) fail("its JSON is nested more than 128 deep");
+    if (event == Json::parse_event_t::object_end || event == Json::parse_event_t::array_end)
+      return true;
+    bytes += kValueBytes;
+    if (bytes > memory_bytes) refuse_room(path_, bytes);
+    return true;
+  };
   const auto* begin = reinterpret_cast<const char*>(text.data());
   try {
-    root_ = Json::parse(begin, begin + text.size());
+    root_ = Json::parse(begin, begin + text.size(), watch);
   } catch (const Json::exception& error) {
     fail(error.what());
   }
@@ -165,24 +187,31 @@ void GltfDocument::parse(std::span<const std::byte> text) {
 
 // Reads a GLB: 12 bytes of header, then chunks of length, type and data. The first is the JSON; the
 // second may be the binary data.
-void GltfDocument::read_chunks(std::span<const std::byte> file) {
-  if (u32_at(file, 4) != 2) fail("the version of the GLB is not 2");
-  if (u32_at(file, 8) != file.size()) fail("the GLB declares another length than the file has");
-  std::size_t at = 12;
-  for (std::size_t chunk = 0; at < file.size(); ++chunk) {
-    if (file.size() - at < 8)
+void GltfDocument::read_chunks(std::uint64_t memory_bytes) {
+  std::array<std::byte, 12> header;
+  file_.read_at(0, header);
+  if (u32_at(header, 4) != 2) fail("the version of the GLB is not 2");
+  if (u32_at(header, 8) != file_.size()) fail("the GLB declares another length than the file has");
+  std::uint64_t at = 12;
+  for (std::size_t chunk = 0; at < file_.size(); ++chunk) {
+    if (file_.size() - at < 8)
       fail("offset " + std::to_string(at) + ": the file ends in the header of a GLB chunk");
-    const std::uint32_t length = u32_at(file, at);
-    const std::uint32_t type = u32_at(file, at + 4);
+    std::array<std::byte, 8> head;
+    file_.read_at(at, head);
+    const std::uint32_t length = u32_at(head, 0);
+    const std::uint32_t type = u32_at(head, 4);
     at += 8;
-    if (length > file.size() - at) {
+    if (length > file_.size() - at) {
       fail("offset " + std::to_string(at) + ": a GLB chunk reaches past the end of the file");
     }
-    const std::span<const std::byte> data = file.subspan(at, length);
     if ((chunk == 0) != (type == kJsonChunk))
       fail("the first chunk of a GLB, and no other, must be JSON");
-    if (chunk == 0) parse(data);
-    if (chunk == 1 && type == kBinaryChunk) binary_chunk_.assign(data.begin(), data.end());
+    if (chunk == 0) parse(read_text(at, length, memory_bytes), memory_bytes);
+    if (chunk == 1 && type == kBinaryChunk) {
+      binary_chunk_.file = &file_;
+      binary_chunk_.offset = at;
+      binary_chunk_.length = length;
+    }
     at += length;
   }
   if (root_.is_null()) fail("the GLB has no JSON");
@@ -233,15 +262,14 @@ std::string GltfDocument::file_name(const std::string& uri) {
   return name;
 }
 
-// Returns the content of a file that the document names.
-std::vector<std::byte> GltfDocument::read_part(const std::filesystem::path& name) const {
+// Opens a file that the document names.
+InputFile GltfDocument::open_part(const std::filesystem::path& name) const {
   const std::filesystem::path part = path_.parent_path() / name;
   if (!std::filesystem::is_regular_file(part)) fail("its file " + part.string() + " is missing");
-  return read_file(part);
+  return InputFile(part);
 }
 
-std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
-  if (!uri.starts_with("data:")) return read_part(file_name(uri));
+std::vector<std::byte> GltfDocument::decode_uri(const std::string& uri) const {
   const std::size_t comma = uri.find(";base64,");
   if (comma == std::string::npos) fail("a data URI is not base64");
   auto bytes = decode_base64(std::string_view(uri).substr(comma + 8));
@@ -249,58 +277,75 @@ std::vector<std::byte> GltfDocument::fetch(const std::string& uri) const {
   return std::move(*bytes);
 }
 
-std::span<const std::byte> GltfDocument::buffer(std::uint64_t index) {
-  // Find the first buffer that names the same file.
+void GltfDocument::Buffer::read(std::uint64_t at, std::span<std::byte> out) const {
+  if (file != nullptr) {
+    file->read_at(offset + at, out);
+  } else {
+    std::memcpy(out.data(), held.data() + at, out.size());
+  }
+}
+
+const GltfDocument::Buffer& GltfDocument::buffer(std::uint64_t index) {
   const Json& description = at("buffers", index);
+  std::optional<Buffer>& found = buffers_[index];
+  if (found) return *found;
+
+  // Find its bytes. A file that several buffers name is opened, and counted, once
   const auto uri = description.find("uri");
   const bool has_uri = uri != description.end();
   if (has_uri && !uri->is_string()) fail("a uri is not a string");
-  const std::string none;
-  const std::string& text = has_uri ? uri->get_ref<const std::string&>() : none;
-  std::uint64_t owner = index;
-  if (has_uri && !text.starts_with("data:")) {
+  Buffer made;
+  if (!has_uri) {
+    if (index == 0) made = binary_chunk_;
+  } else if (const std::string& text = uri->get_ref<const std::string&>();
+             text.starts_with("data:")) {
+    made.held = decode_uri(text);
+    made.length = made.held.size();
+    bytes_read_ += made.length;
+  } else {
     const std::string name = std::filesystem::path(file_name(text)).lexically_normal().string();
-    owner = buffer_of_file_.try_emplace(name, index).first->second;
-  }
-
-  // Load its bytes on first use.
-  auto& loaded = buffers_[owner];
-  if (!loaded) {
-    if (has_uri) {
-      loaded = fetch(text);
-    } else if (index == 0) {
-      loaded = std::move(binary_chunk_);
-    } else {
-      loaded.emplace();
+    auto known = files_.find(name);
+    if (known == files_.end()) {
+      known = files_.try_emplace(name, open_part(name)).first;
+      bytes_read_ += known->second.size();
     }
-    bytes_read_ += loaded->size();
+    made.file = &known->second;
+    made.length = known->second.size();
   }
 
-  // Return as many bytes as the buffer declares, because binary chunks are padded.
+  // Take as many bytes as the buffer declares, because binary chunks are padded
   const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
-  if (length > loaded->size()) {
-    fail("buffer " + std::to_string(index) + " has only " + std::to_string(loaded->size()) +
+  if (length > made.length) {
+    fail("buffer " + std::to_string(index) + " has only " + std::to_string(made.length) +
          " bytes of the declared " + std::to_string(length));
   }
-  return std::span(*loaded).first(length);
+  made.length = length;
+  return found.emplace(std::move(made));
 }
 
-std::span<const std::byte> GltfDocument::view(std::uint64_t index) {
+GltfDocument::View GltfDocument::find_view(std::uint64_t index) {
   const Json& description = at("bufferViews", index);
   const auto owner = unsigned_at(description, "buffer");
   if (!owner) fail("a bufferView has no buffer");
-  const std::span<const std::byte> bytes = buffer(*owner);
-  const std::uint64_t offset = unsigned_at(description, "byteOffset").value_or(0);
-  const std::uint64_t length = unsigned_at(description, "byteLength").value_or(0);
-  if (offset > bytes.size() || length > bytes.size() - offset) {
+  const std::uint64_t bytes = buffer(*owner).length;
+  const View view{*owner, unsigned_at(description, "byteOffset").value_or(0),
+                  unsigned_at(description, "byteLength").value_or(0)};
+  if (view.offset > bytes || view.length > bytes - view.offset) {
     fail("bufferView " + std::to_string(index) + " reaches past its buffer");
   }
-  return bytes.subspan(offset, length);
+  return view;
 }
 
-GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::size_t components,
-                                                   std::optional<std::size_t> expected) {
-  // Check the shape of the elements.
+std::vector<std::byte> GltfDocument::view(std::uint64_t index) {
+  const View view = find_view(index);
+  std::vector<std::byte> bytes(view.length);
+  buffer(view.buffer).read(view.offset, bytes);
+  return bytes;
+}
+
+GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::size_t components,
+                                                   std::optional<std::uint64_t> expected) {
+  // Check the shape of the elements
   const Json& accessor = at("accessors", index);
   const std::string name = "accessor " + std::to_string(index);
   if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
@@ -315,10 +360,9 @@ GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::siz
     fail(name + " is of the wrong type");
   }
   const auto flag = accessor.find("normalized");
-  const bool normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>();
 
-  // Check that all elements lie in the buffer view.
-  const std::span<const std::byte> bytes = view(*view_index);
+  // Check that all elements lie in the buffer view
+  const View view = find_view(*view_index);
   const std::uint64_t offset = unsigned_at(accessor, "byteOffset").value_or(0);
   const std::uint64_t element_bytes = component->bytes * components;
   const std::uint64_t stride =
@@ -326,22 +370,41 @@ GltfDocument::Elements GltfDocument::read_accessor(std::uint64_t index, std::siz
   const std::uint64_t elements = unsigned_at(accessor, "count").value_or(0);
   if (expected && elements != *expected) fail(name + " does not have as many elements as POSITION");
   if (stride < element_bytes) fail(name + " has elements that overlap");
-  // This is (elements - 1) * stride + element_bytes > bytes.size() - offset without overflow.
-  if (elements > 0 && (offset > bytes.size() || element_bytes > bytes.size() - offset ||
-                       elements - 1 > (bytes.size() - offset - element_bytes) / stride)) {
+  // This is (elements - 1) * stride + element_bytes > view.length - offset without overflow
+  if (elements > 0 && (offset > view.length || element_bytes > view.length - offset ||
+                       elements - 1 > (view.length - offset - element_bytes) / stride)) {
     fail(name + " reaches past its bufferView");
   }
+  return {.count = elements,
+          .components = components,
+          .buffer = view.buffer,
+          .offset = view.offset + offset,
+          .stride = stride,
+          .type = type,
+          .normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>()};
+}
 
-  // Read them.
-  Elements read{elements, {}};
-  read.values.reserve(elements * components);
-  for (std::uint64_t i = 0; i < elements; ++i) {
-    for (std::size_t k = 0; k < components; ++k) {
-      const double value = load(&bytes[offset + i * stride + k * component->bytes], type);
-      read.values.push_back(normalised ? std::max(-1.0, value / component->scale) : value);
+void GltfDocument::read(const Elements& elements,
+                        const std::function<void(std::span<const double>)>& take) const {
+  constexpr std::uint64_t kBlockBytes = 1 << 18;
+  const Component component = *component_of(elements.type);
+  const std::uint64_t element_bytes = component.bytes * elements.components;
+  const std::uint64_t at_once = std::max<std::uint64_t>(1, kBlockBytes / elements.stride);
+  const Buffer& buffer = *buffers_[elements.buffer];
+  std::vector<std::byte> bytes;
+  std::array<double, 4> values{};
+  for (std::uint64_t first = 0; first < elements.count; first += at_once) {
+    const std::uint64_t count = std::min(at_once, elements.count - first);
+    bytes.resize((count - 1) * elements.stride + element_bytes);
+    buffer.read(elements.offset + first * elements.stride, bytes);
+    for (std::uint64_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < elements.components; ++k) {
+        const double value = load(&bytes[i * elements.stride + k * component.bytes], elements.type);
+        values[k] = elements.normalised ? std::max(-1.0, value / component.scale) : value;
+      }
+      take(std::span(values).first(elements.components));
     }
   }
-  return read;
 }
 
 }  // namespace ptc

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -19,16 +20,22 @@
 
 #include <nlohmann/json.hpp>
 
+#include "engine/io/file/file.h"
+
 namespace ptc {
 
-/// A .gltf file with its buffers, or a .glb file. Buffers are read when they are first needed.
+/// A .gltf file with its buffers, or a .glb file. What is in memory is the JSON and buffers in data
+/// URIs; other buffers are read from their files piece by piece.
 class GltfDocument {
  public:
   using Json = nlohmann::json;
 
-  /// Reads and parses the file, but no other file.
-  /// @throws DataError when it is neither a JSON object nor a GLB of version 2; std::system_error
-  explicit GltfDocument(const std::filesystem::path& path);
+  /// Reads and parses the JSON, but no other file.
+  /// @param memory_bytes  cap on the memory of the JSON
+  /// @throws DataError when the file is neither a JSON object nor a GLB of version 2, or the JSON
+  /// is
+  ///         nested too deep; LimitError when it takes more memory; std::system_error
+  GltfDocument(const std::filesystem::path& path, std::uint64_t memory_bytes);
 
   /// Returns the path of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
@@ -54,40 +61,67 @@ class GltfDocument {
   [[nodiscard]] std::optional<std::array<double, N>> numbers_at(const Json& object,
                                                                 const char* key) const;
 
-  /// Returns the bytes of bufferViews[index], which live as long as this document.
+  /// Reads the bytes of bufferViews[index].
   /// @throws DataError when the view does not exist or lies outside its buffer; std::system_error
-  [[nodiscard]] std::span<const std::byte> view(std::uint64_t index);
-  /// Returns the bytes to which a URI leads: those of a data URI, or of a file whose path is
-  /// relative to this one. @throws DataError, std::system_error
-  [[nodiscard]] std::vector<std::byte> fetch(const std::string& uri) const;
+  [[nodiscard]] std::vector<std::byte> view(std::uint64_t index);
+  /// Returns the bytes of a data URI. @throws DataError
+  [[nodiscard]] std::vector<std::byte> decode_uri(const std::string& uri) const;
   /// Returns the file name for which a URI stands; escapes such as %20 are resolved.
   [[nodiscard]] static std::string file_name(const std::string& uri);
 
-  /// The elements of an accessor.
+  /// Where the elements of an accessor lie.
   struct Elements {
-    std::size_t count = 0;       ///< number of elements
-    std::vector<double> values;  ///< count x components
+    std::uint64_t count = 0;  ///< number of elements
+    std::size_t components = 0;
+    std::uint64_t buffer = 0;              ///< index of the buffer
+    std::uint64_t offset = 0, stride = 0;  ///< of the first element, and between two, bytes
+    std::uint64_t type = 0;                ///< componentType
+    bool normalised = false;
   };
-  /// Reads the elements of accessors[index]. Normalised integers are scaled to [0, 1] or [-1, 1].
+  /// Finds the elements of accessors[index].
   /// @param components  numbers in each element
   /// @param expected    number of elements that there must be, if it is known
   /// @throws DataError when the accessor breaks a rule or has another shape; std::system_error
-  [[nodiscard]] Elements read_accessor(std::uint64_t index, std::size_t components,
-                                       std::optional<std::size_t> expected = std::nullopt);
-  /// Returns the size of the file and of the buffers that were read so far, bytes.
+  [[nodiscard]] Elements find_elements(std::uint64_t index, std::size_t components,
+                                       std::optional<std::uint64_t> expected = std::nullopt);
+  /// Reads elements, in their order. Normalised integers are scaled to [0, 1] or [-1, 1].
+  /// @param take  is called with the numbers of each element
+  /// @throws DataError, std::system_error when the file does not give the bytes
+  void read(const Elements& elements,
+            const std::function<void(std::span<const double>)>& take) const;
+  /// Returns the size of the file and of the buffers that were used so far, bytes.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
  private:
-  void parse(std::span<const std::byte> text);
-  void read_chunks(std::span<const std::byte> file);
-  std::span<const std::byte> buffer(std::uint64_t index);
-  [[nodiscard]] std::vector<std::byte> read_part(const std::filesystem::path& name) const;
+  /// The bytes of a buffer: in a file, or in memory.
+  struct Buffer {
+    const InputFile* file = nullptr;  ///< null: `held`
+    std::uint64_t offset = 0;         ///< in the file
+    std::uint64_t length = 0;         ///< that there is
+    std::vector<std::byte> held;
+
+    void read(std::uint64_t at, std::span<std::byte> out) const;
+  };
+  /// A buffer view, checked.
+  struct View {
+    std::uint64_t buffer = 0, offset = 0, length = 0;
+  };
+
+  void parse(const std::vector<std::byte>& text, std::uint64_t memory_bytes);
+  [[nodiscard]] std::vector<std::byte> read_text(std::uint64_t offset, std::uint64_t length,
+                                                 std::uint64_t memory_bytes) const;
+  void read_chunks(std::uint64_t memory_bytes);
+  /// Returns a buffer with as many bytes as it declares.
+  const Buffer& buffer(std::uint64_t index);
+  [[nodiscard]] View find_view(std::uint64_t index);
+  [[nodiscard]] InputFile open_part(const std::filesystem::path& name) const;
 
   std::filesystem::path path_;
+  InputFile file_;
   Json root_;
-  std::vector<std::byte> binary_chunk_;
-  std::vector<std::optional<std::vector<std::byte>>> buffers_;  // read when first needed
-  std::map<std::string, std::uint64_t> buffer_of_file_;         // first buffer that names the file
+  Buffer binary_chunk_;
+  std::vector<std::optional<Buffer>> buffers_;  // found when first needed
+  std::map<std::string, InputFile> files_;      // of buffers, by name
   std::uint64_t bytes_read_ = 0;
 };
 

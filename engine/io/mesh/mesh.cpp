@@ -115,14 +115,14 @@ bool Mesh::emits() const {
   return std::ranges::any_of(material_of, [&](std::size_t m) { return emits(materials[m]); });
 }
 
-MeshFile read_mesh(const std::filesystem::path& path) {
+MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room) {
   const std::string extension = lower_extension(path);
   const std::string unpacked = extension == ".gz" ? lower_extension(path.stem()) : extension;
-  if (unpacked == ".ply") return read_ply_mesh(path);
-  if (unpacked == ".off") return read_off_mesh(path);
-  if (unpacked == ".obj") return read_obj_mesh(path);
-  if (extension == ".gltf" || extension == ".glb") return read_gltf_mesh(path);
-  if (extension == ".stl") return read_stl_mesh(path);
+  if (unpacked == ".ply") return read_ply_mesh(path, room);
+  if (unpacked == ".off") return read_off_mesh(path, room);
+  if (unpacked == ".obj") return read_obj_mesh(path, room);
+  if (extension == ".gltf" || extension == ".glb") return read_gltf_mesh(path, room);
+  if (extension == ".stl") return read_stl_mesh(path, room);
   throw DataError(
       path.string() +
       ": nothing that can be read: as a mesh its name would end in .obj, .ply, .off, .gltf, "

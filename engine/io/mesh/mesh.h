@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -61,9 +62,21 @@ struct MeshCamera {
   float horizontal_fov = 0.8f;  ///< radians
 };
 
+class SpilledMesh;
+
+/// The memory in which a mesh is read, and where one goes that takes more.
+struct MeshRoom {
+  /// Cap on the memory while a mesh is read, bytes.
+  std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max();
+  /// Directory of temporary files for a mesh that takes more.
+  std::filesystem::path temp_directory = ".";
+};
+
 /// The content of a mesh file.
 struct MeshFile {
-  Mesh mesh;                        ///< all meshes of the file, with world transforms applied
+  Mesh mesh;  ///< all meshes of the file, with world transforms applied
+  /// The mesh in place of `mesh`, where that would take more memory than it may (spilled_mesh.h).
+  std::shared_ptr<const SpilledMesh> spilled;
   std::vector<MeshCamera> cameras;  ///< world coordinates
   /// The warnings about parts that were left out or replaced: one line for each kind, without the
   /// name of the file.
@@ -81,10 +94,11 @@ struct MeshFile {
 /// with their textures. A map_Ke without Ke is the emission itself. A texture that is missing or
 /// damaged causes a warning, and the plain colour takes its place. Vertex colours, skins and morph
 /// targets are left out.
+/// @param room  for the mesh; one that takes more memory than that is left on the disk
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not
-///         finite; std::system_error
-/// Memory: about 150 bytes per triangle during the call.
-[[nodiscard]] MeshFile read_mesh(const std::filesystem::path& path);
+///         finite; LimitError when the JSON of a glTF does not fit in memory; std::system_error
+/// Memory: about 150 bytes per triangle during the call, but not more than `room` allows.
+[[nodiscard]] MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room = {});
 
 /// Appends a transformed copy of `other` to `mesh`; both keep their materials. An empty mesh takes
 /// its origin from the copy, any other keeps its own. If only one of the two has normals or texture

@@ -80,8 +80,10 @@ struct GltfMaterial {
 
 class GltfMesh {
  public:
-  explicit GltfMesh(const std::filesystem::path& path)
-      : document_(path), textures_(path.parent_path(), warnings_) {}
+  GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
+      : document_(path, room.memory_bytes),
+        soup_(path, room),
+        textures_(path.parent_path(), warnings_) {}
 
   MeshFile read() {
     check_extensions();
@@ -91,7 +93,7 @@ class GltfMesh {
     for (std::size_t i = 0; i < document_.count("skins"); ++i) {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }
-    return {build_mesh(std::move(soup_), document_.path()), std::move(cameras_), warnings_.lines()};
+    return mesh_file(std::move(soup_), std::move(cameras_), warnings_.lines());
   }
 
  private:
@@ -199,30 +201,29 @@ class GltfMesh {
         attributes == nullptr ? std::nullopt : document_.unsigned_at(*attributes, "POSITION");
     if (!position) return;
     const GltfMaterial& material = use_material(document_.unsigned_at(primitive, "material"));
-    const std::size_t base = soup_.positions.size();
-    const std::size_t count = add_vertices(*attributes, *position, material, world);
+    const std::uint64_t base = soup_.positions.size();
+    const std::uint64_t count = add_vertices(*attributes, *position, material, world);
     add_triangles(primitive, mode, base, count, material, mirrors(world));
   }
 
   // Appends positions, normals and texture coordinates, as many of each; missing ones are 0.
-  std::size_t add_vertices(const Json& attributes, std::uint64_t position,
-                           const GltfMaterial& material, const glm::dmat4& world) {
-    const auto positions = document_.read_accessor(position, 3);
+  std::uint64_t add_vertices(const Json& attributes, std::uint64_t position,
+                             const GltfMaterial& material, const glm::dmat4& world) {
+    const GltfDocument::Elements positions = document_.find_elements(position, 3);
     check_growth(positions.count);
-    for (std::size_t i = 0; i < positions.count; ++i) {
-      const double* const p = &positions.values[3 * i];
-      soup_.positions.emplace_back(world * glm::dvec4(p[0], p[1], p[2], 1));
-    }
+    document_.read(positions, [&](std::span<const double> p) {
+      soup_.add_position(glm::dvec3(world * glm::dvec4(p[0], p[1], p[2], 1)));
+    });
     add_normals(attributes, positions.count, world);
-    soup_.normals.resize(soup_.positions.size(), glm::vec3(0));
+    soup_.normals.grow(soup_.positions.size(), glm::vec3(0));
     add_uvs(attributes, positions.count, material);
-    soup_.uvs.resize(soup_.positions.size(), glm::vec2(0));
+    soup_.uvs.grow(soup_.positions.size(), glm::vec2(0));
     return positions.count;
   }
 
   // Refuses more vertices or corners than the size of the files justifies, because many nodes may
   // show one mesh.
-  void check_growth(std::size_t more) const {
+  void check_growth(std::uint64_t more) const {
     const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * document_.bytes_read();
     if (more > most || soup_.positions.size() > most - more ||
         more >= MeshSoup::kNone - soup_.positions.size() || soup_.corners.size() > most) {
@@ -230,63 +231,68 @@ class GltfMesh {
     }
   }
 
-  void add_normals(const Json& attributes, std::size_t count, const glm::dmat4& world) {
+  void add_normals(const Json& attributes, std::uint64_t count, const glm::dmat4& world) {
     const auto index = document_.unsigned_at(attributes, "NORMAL");
     if (!index) return;
-    const auto normals = document_.read_accessor(*index, 3, count);
     const glm::dmat3 turn = normal_transform(world);
-    for (std::size_t i = 0; i < normals.count; ++i) {
-      const double* const n = &normals.values[3 * i];
-      soup_.normals.emplace_back(turn * glm::dvec3(n[0], n[1], n[2]));
-    }
+    document_.read(document_.find_elements(*index, 3, count), [&](std::span<const double> n) {
+      soup_.normals.push_back(glm::vec3(turn * glm::dvec3(n[0], n[1], n[2])));
+    });
   }
 
-  void add_uvs(const Json& attributes, std::size_t count, const GltfMaterial& material) {
+  void add_uvs(const Json& attributes, std::uint64_t count, const GltfMaterial& material) {
     const std::string key = "TEXCOORD_" + std::to_string(material.place.uv_set);
     const auto index = document_.unsigned_at(attributes, key.c_str());
     if (!index) return;
     has_uvs_ = true;
-    const auto uvs = document_.read_accessor(*index, 2, count);
     const double cosine = std::cos(material.place.rotation);
     const double sine = std::sin(material.place.rotation);
-    for (std::size_t i = 0; i < uvs.count; ++i) {
-      const glm::dvec2 scaled =
-          material.place.scale * glm::dvec2(uvs.values[2 * i], uvs.values[2 * i + 1]);
+    document_.read(document_.find_elements(*index, 2, count), [&](std::span<const double> uv) {
+      const glm::dvec2 scaled = material.place.scale * glm::dvec2(uv[0], uv[1]);
       const double u = material.place.offset.x + cosine * scaled.x + sine * scaled.y;
       const double v = material.place.offset.y - sine * scaled.x + cosine * scaled.y;
-      soup_.uvs.emplace_back(u, 1 - v);  // v of glTF grows downwards
-    }
+      soup_.uvs.push_back({u, 1 - v});  // v of glTF grows downwards
+    });
   }
 
-  void add_triangles(const Json& primitive, std::uint64_t mode, std::size_t base, std::size_t count,
-                     const GltfMaterial& material, bool mirrored) {
-    // Read the indices, or count up without them.
-    std::vector<std::uint32_t> order;
-    if (const auto accessor = document_.unsigned_at(primitive, "indices")) {
-      for (const double index : document_.read_accessor(*accessor, 1).values) {
-        if (!(index >= 0 && index < static_cast<double>(count))) {
-          document_.fail("an index refers to no vertex");
-        }
-        order.push_back(static_cast<std::uint32_t>(index));
+  // Adds the triangles of a list, strip or fan.
+  void add_triangles(const Json& primitive, std::uint64_t mode, std::uint64_t base,
+                     std::uint64_t count, const GltfMaterial& material, bool mirrored) {
+    std::array<std::uint64_t, 3> last{};  // vertices; the oldest, or the first of a fan, in front
+    std::uint64_t seen = 0;
+    const auto add = [&](std::uint64_t vertex) {
+      const std::uint64_t place = seen++;
+      if (place < 3) {
+        last[place] = vertex;
+      } else if (mode == 4) {
+        last[place % 3] = vertex;
+      } else {
+        last = {mode == 5 ? last[1] : last[0], last[2], vertex};
       }
-    } else {
-      for (std::uint32_t i = 0; i < count; ++i) order.push_back(i);
-    }
-
-    // Add the triangles of a list, strip or fan.
-    const std::size_t step = mode == 4 ? 3 : 1;
-    for (std::size_t i = 0; i + 2 < order.size(); i += step) {
-      std::array<std::size_t, 3> at = {i, i + 1, i + 2};
-      if (mode == 5 && i % 2 == 1) std::swap(at[0], at[1]);  // strip
-      if (mode == 6) at[0] = 0;                              // fan
+      if (mode == 4 ? place % 3 != 2 : place < 2) return;
+      std::array<std::uint64_t, 3> at = last;
+      if (mode == 5 && place % 2 == 1) std::swap(at[0], at[1]);  // every second one of a strip
       if (mirrored) std::swap(at[1], at[2]);
       std::array<Corner, 3> triangle;
       for (std::size_t k = 0; k < 3; ++k) {
-        const auto vertex = static_cast<std::uint32_t>(base + order[at[k]]);
-        triangle[k] = {vertex, vertex, vertex};
+        const auto index = static_cast<std::uint32_t>(base + at[k]);
+        triangle[k] = {index, index, index};
       }
-      soup_.add_polygon(triangle, material.index, document_.path());
+      soup_.add_polygon(triangle, material.index);
+    };
+
+    // Follow the indices, or count up without them
+    const auto accessor = document_.unsigned_at(primitive, "indices");
+    if (!accessor) {
+      for (std::uint64_t i = 0; i < count; ++i) add(i);
+      return;
     }
+    document_.read(document_.find_elements(*accessor, 1), [&](std::span<const double> index) {
+      if (!(index[0] >= 0 && index[0] < static_cast<double>(count))) {
+        document_.fail("an index refers to no vertex");
+      }
+      add(static_cast<std::uint64_t>(index[0]));
+    });
   }
 
   // Returns a material of the file, or the default one, and adds it to the soup on first use.
@@ -298,7 +304,7 @@ class GltfMesh {
     Material material;
     material.albedo = glm::vec3(1);
     if (index) read_material(document_.at("materials", *index), material, made);
-    made.index = soup_.add_material(std::move(material), document_.path());
+    made.index = soup_.add_material(std::move(material));
     return made;
   }
 
@@ -405,13 +411,13 @@ class GltfMesh {
     if (uri != image.end() && uri->is_string()) {
       const std::string text = uri->get<std::string>();
       if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
-      return textures_.decode(label, document_.fetch(text), document_.bytes_read());
+      return textures_.decode(label, document_.decode_uri(text), document_.bytes_read());
     }
     const auto view = document_.unsigned_at(image, "bufferView");
     if (!view) document_.fail("an image has neither uri nor bufferView");
     const auto [at, is_new] = image_of_view_.try_emplace(*view);
     if (is_new) {
-      const std::span<const std::byte> bytes = document_.view(*view);
+      const std::vector<std::byte> bytes = document_.view(*view);
       at->second = textures_.decode(label, bytes, document_.bytes_read());
     }
     return at->second;
@@ -450,9 +456,9 @@ class GltfMesh {
 
 }  // namespace
 
-MeshFile read_gltf_mesh(const std::filesystem::path& path) {
+MeshFile read_gltf_mesh(const std::filesystem::path& path, const MeshRoom& room) {
   try {
-    return GltfMesh(path).read();
+    return GltfMesh(path, room).read();
   } catch (const nlohmann::json::exception& error) {
     throw DataError(path.string() + ": " + error.what());
   }

@@ -28,13 +28,13 @@ using Corner = MeshSoup::Corner;
 
 class ObjMesh {
  public:
-  explicit ObjMesh(const std::filesystem::path& path)
-      : path_(path), stream_(path), textures_(path.parent_path(), warnings_) {}
+  ObjMesh(const std::filesystem::path& path, const MeshRoom& room)
+      : path_(path), stream_(path), soup_(path, room), textures_(path.parent_path(), warnings_) {}
 
   MeshFile read() {
     std::string_view line;
     while (next_logical_line(line)) read_line(line);
-    return {build_mesh(std::move(soup_), path_), {}, warnings_.lines()};
+    return mesh_file(std::move(soup_), {}, warnings_.lines());
   }
 
  private:
@@ -60,13 +60,13 @@ class ObjMesh {
     const std::string_view keyword = words.next();
     if (keyword == "v") {
       const auto p = read_numbers<3>(words, 3);
-      soup_.positions.emplace_back(p[0], p[1], p[2]);
+      soup_.add_position({p[0], p[1], p[2]});
     } else if (keyword == "vn") {
       const auto n = read_numbers<3>(words, 3);
-      soup_.normals.emplace_back(n[0], n[1], n[2]);
+      soup_.normals.push_back({n[0], n[1], n[2]});
     } else if (keyword == "vt") {
       const auto t = read_numbers<2>(words, 1);
-      soup_.uvs.emplace_back(t[0], t[1]);
+      soup_.uvs.push_back({t[0], t[1]});
     } else if (keyword == "f") {
       read_face(words);
     } else if (keyword == "usemtl") {
@@ -124,8 +124,8 @@ class ObjMesh {
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
       corners_.push_back(read_corner(word));
     }
-    if (!material_) material_ = soup_.add_material({}, path_);
-    soup_.add_polygon(corners_, *material_, path_);
+    if (!material_) material_ = soup_.add_material({});
+    soup_.add_polygon(corners_, *material_);
   }
 
   // Returns the index of a material in the soup, to which it is added when it is first used.
@@ -140,7 +140,7 @@ class ObjMesh {
     } else {
       warnings_.add(kMaterialUndefined, "'" + name + "'");
     }
-    return used_[name] = soup_.add_material(std::move(material), path_);
+    return used_[name] = soup_.add_material(std::move(material));
   }
 
   // Reads libraries: names that are separated by blanks, or one name with blanks in it, which may
@@ -191,8 +191,8 @@ class ObjMesh {
 
 }  // namespace
 
-MeshFile read_obj_mesh(const std::filesystem::path& path) {
-  return ObjMesh(path).read();
+MeshFile read_obj_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+  return ObjMesh(path, room).read();
 }
 
 }  // namespace ptc

@@ -21,13 +21,14 @@ using Corner = MeshSoup::Corner;
 
 class OffMesh {
  public:
-  explicit OffMesh(const std::filesystem::path& path) : path_(path), stream_(path) {}
+  OffMesh(const std::filesystem::path& path, const MeshRoom& room)
+      : stream_(path), soup_(path, room) {}
 
   MeshFile read() {
     read_header();
     for (std::uint64_t i = 0; i < vertices_; ++i) read_vertex();
     for (std::uint64_t i = 0; i < faces_; ++i) read_face();
-    return {build_mesh(std::move(soup_), path_), {}, {}};
+    return mesh_file(std::move(soup_), {}, {});
   }
 
  private:
@@ -94,9 +95,9 @@ class OffMesh {
     }
     const std::size_t least = 3U + (has_normals_ ? 3U : 0U) + (has_uvs_ ? 2U : 0U);
     if (n < least) stream_.fail_at_line("the vertex has too few values");
-    soup_.positions.emplace_back(values[0], values[1], values[2]);
-    if (has_normals_) soup_.normals.emplace_back(values[3], values[4], values[5]);
-    if (has_uvs_) soup_.uvs.emplace_back(values[n - 2], values[n - 1]);
+    soup_.add_position({values[0], values[1], values[2]});
+    if (has_normals_) soup_.normals.push_back({values[3], values[4], values[5]});
+    if (has_uvs_) soup_.uvs.push_back({values[n - 2], values[n - 1]});
   }
 
   void read_face() {
@@ -116,10 +117,9 @@ class OffMesh {
       corners_.push_back(
           {at, has_normals_ ? at : MeshSoup::kNone, has_uvs_ ? at : MeshSoup::kNone});
     }
-    soup_.add_polygon(corners_, 0, path_);
+    soup_.add_polygon(corners_, 0);
   }
 
-  std::filesystem::path path_;
   ByteStream stream_;
   MeshSoup soup_;
   std::uint64_t vertices_ = 0;  // as the header counts them
@@ -131,8 +131,8 @@ class OffMesh {
 
 }  // namespace
 
-MeshFile read_off_mesh(const std::filesystem::path& path) {
-  return OffMesh(path).read();
+MeshFile read_off_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+  return OffMesh(path, room).read();
 }
 
 }  // namespace ptc

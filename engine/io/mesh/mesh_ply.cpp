@@ -12,7 +12,8 @@ using Corner = MeshSoup::Corner;
 
 class PlyMesh {
  public:
-  explicit PlyMesh(const std::filesystem::path& path) : path_(path), reader_(path) {
+  PlyMesh(const std::filesystem::path& path, const MeshRoom& room)
+      : path_(path), reader_(path), soup_(path, room) {
     vertex_ = reader_.find("vertex");
     if (vertex_ == nullptr) throw DataError(path.string() + ": the PLY file has no vertices");
     // Find the properties now, because faces may come before the vertices and need to know them.
@@ -35,7 +36,7 @@ class PlyMesh {
       }
     }
     reader_.require_end();
-    return {build_mesh(std::move(soup_), path_), {}, {}};
+    return mesh_file(std::move(soup_), {}, {});
   }
 
  private:
@@ -58,12 +59,12 @@ class PlyMesh {
       reader_.read(element, record);
       const auto value = [&](std::size_t at) { return record.scalars[at]; };
       const auto& p = *position_;
-      soup_.positions.emplace_back(value(p[0]), value(p[1]), value(p[2]));
+      soup_.add_position({value(p[0]), value(p[1]), value(p[2])});
       if (normal_) {
         const auto& n = *normal_;
-        soup_.normals.emplace_back(value(n[0]), value(n[1]), value(n[2]));
+        soup_.normals.push_back({value(n[0]), value(n[1]), value(n[2])});
       }
-      if (uv_) soup_.uvs.emplace_back(value((*uv_)[0]), value((*uv_)[1]));
+      if (uv_) soup_.uvs.push_back({value((*uv_)[0]), value((*uv_)[1])});
     }
   }
 
@@ -83,7 +84,7 @@ class PlyMesh {
       } else {
         corners_.clear();
         for (const double index : record.lists[*indices]) corners_.push_back(corner(record, index));
-        soup_.add_polygon(corners_, 0, path_);
+        soup_.add_polygon(corners_, 0);
       }
     }
   }
@@ -103,7 +104,7 @@ class PlyMesh {
       const bool turned = n % 2 == 0;
       const std::array<Corner, 3> triangle = {corners_[turned ? n - 2 : n - 3],
                                               corners_[turned ? n - 3 : n - 2], corners_[n - 1]};
-      soup_.add_polygon(triangle, 0, path_);
+      soup_.add_polygon(triangle, 0);
     }
   }
 
@@ -127,8 +128,8 @@ class PlyMesh {
 
 }  // namespace
 
-MeshFile read_ply_mesh(const std::filesystem::path& path) {
-  return PlyMesh(path).read();
+MeshFile read_ply_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+  return PlyMesh(path, room).read();
 }
 
 }  // namespace ptc

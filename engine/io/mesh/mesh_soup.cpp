@@ -20,6 +20,8 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/soup_rules.h"
+#include "engine/io/mesh/spilled_mesh.h"
 
 namespace ptc {
 namespace {
@@ -28,10 +30,6 @@ using Corner = MeshSoup::Corner;
 using Triangle = std::array<Corner, 3>;
 
 constexpr std::uint32_t kNone = MeshSoup::kNone;
-constexpr std::size_t kMaxCorners = std::size_t{1} << 28;
-// The greatest distance from the centre along an axis. Beyond it, squares of distances leave the
-// range of float.
-constexpr double kMaxExtent = 1e18;
 
 // The triangles of a soup, each with the material of its polygon.
 struct Soup {
@@ -43,86 +41,65 @@ struct Soup {
   throw DataError(path.string() + ": " + rule);
 }
 
-void check_corners(const MeshSoup& soup, const std::filesystem::path& path) {
+void check_corners(MeshSoup& soup) {
   const auto within = [](std::uint32_t index, std::size_t size) {
     return index == kNone || index < size;
   };
   std::size_t corner = 0;
-  for (std::size_t i = 0; i < soup.polygon_sizes.size(); ++i) {
-    for (const std::size_t end = corner + soup.polygon_sizes[i]; corner < end; ++corner) {
-      const Corner& c = soup.corners[corner];
+  for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
+    for (const std::size_t end = corner + soup.polygons.items()[i].corners; corner < end;
+         ++corner) {
+      Corner& c = soup.corners.items()[corner];
+      c = soup.valid(c);
       if (c.position >= soup.positions.size() || !within(c.normal, soup.normals.size()) ||
           !within(c.uv, soup.uvs.size())) {
-        refuse(path, "polygon " + std::to_string(i) + ": an index refers to no vertex");
+        refuse(soup.path(), "polygon " + std::to_string(i) + ": an index refers to no vertex");
       }
     }
   }
 }
 
 // Checks all positions and returns the centre of their box, rounded to integers.
-glm::dvec3 checked_origin(const MeshSoup& soup, const std::filesystem::path& path) {
-  Bounds bounds;
-  for (std::size_t i = 0; i < soup.positions.size(); ++i) {
-    const glm::dvec3& p = soup.positions[i];
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) {
-      refuse(path, "vertex " + std::to_string(i) + ": the position is not finite");
-    }
-    if (!fits_coordinates(p)) {
-      refuse(path, "vertex " + std::to_string(i) + ": the position is beyond 2^999");
-    }
-    bounds.add(p);
-  }
-  if (bounds.empty()) return glm::dvec3(0);
-  const glm::dvec3 half = bounds.high / 2.0 - bounds.low / 2.0;
-  if (half.x > kMaxExtent || half.y > kMaxExtent || half.z > kMaxExtent) {
-    refuse(path, "positions are more than 2e18 apart");
-  }
-  return glm::round(bounds.low / 2.0 + bounds.high / 2.0);
+glm::dvec3 checked_origin(const MeshSoup& soup) {
+  PositionCheck check(soup.path());
+  for (const glm::dvec3& p : soup.positions.items()) check.add(p);
+  return check.origin();
 }
 
 // Triangulates all polygons and drops triangles that have no area once their positions are float.
 Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& positions) {
   Soup made;
-  made.triangles.reserve(soup.polygon_sizes.size());
-  made.material_of.reserve(soup.polygon_sizes.size());
+  made.triangles.reserve(soup.polygons.size());
+  made.material_of.reserve(soup.polygons.size());
   std::vector<glm::dvec3> polygon;
   std::vector<std::array<std::uint32_t, 3>> cut;
   std::size_t first = 0;
-  for (std::size_t i = 0; i < soup.polygon_sizes.size(); ++i) {
-    const auto corners = std::span(soup.corners).subspan(first, soup.polygon_sizes[i]);
-    first += soup.polygon_sizes[i];
+  for (const MeshSoup::Polygon& of : soup.polygons.items()) {
+    const auto corners = std::span(soup.corners.items()).subspan(first, of.corners);
+    first += of.corners;
     polygon.clear();
-    for (const Corner& corner : corners) polygon.push_back(soup.positions[corner.position]);
+    for (const Corner& corner : corners) polygon.push_back(soup.positions.items()[corner.position]);
     cut.clear();
     triangulate(polygon, cut);
     for (const auto& [a, b, c] : cut) {
-      const glm::dvec3 at(positions[corners[a].position]);
-      const glm::dvec3 ab = glm::dvec3(positions[corners[b].position]) - at;
-      const glm::dvec3 ac = glm::dvec3(positions[corners[c].position]) - at;
-      if (glm::cross(ab, ac) == glm::dvec3(0)) continue;
+      if (!has_area(positions[corners[a].position], positions[corners[b].position],
+                    positions[corners[c].position]))
+        continue;
       made.triangles.push_back({corners[a], corners[b], corners[c]});
-      made.material_of.push_back(soup.material_of[i]);
+      made.material_of.push_back(of.material);
     }
   }
   return made;
-}
-
-// Scales normals to unit length. A normal that cannot be scaled becomes 0, which means missing.
-void normalise(std::vector<glm::vec3>& normals) {
-  for (glm::vec3& normal : normals) {
-    const double length = glm::length(glm::dvec3(normal));
-    normal =
-        std::isfinite(length) && length > 0 ? glm::vec3(glm::dvec3(normal) / length) : glm::vec3(0);
-  }
 }
 
 // Gives a flat normal to every corner that has none, unless no corner has one: then all normals are
 // removed.
 void complete_normals(MeshSoup& soup, std::vector<Triangle>& triangles,
                       const std::vector<glm::vec3>& positions) {
-  normalise(soup.normals);
+  std::vector<glm::vec3>& normals = soup.normals.items();
+  for (glm::vec3& normal : normals) normal = unit_or_missing(normal);
   const auto missing = [&](const Corner& corner) {
-    return corner.normal == kNone || soup.normals[corner.normal] == glm::vec3(0);
+    return corner.normal == kNone || normals[corner.normal] == glm::vec3(0);
   };
   const bool any = std::ranges::any_of(
       triangles, [&](const Triangle& triangle) { return !std::ranges::all_of(triangle, missing); });
@@ -130,25 +107,22 @@ void complete_normals(MeshSoup& soup, std::vector<Triangle>& triangles,
     if (!any) {
       for (Corner& corner : triangle) corner.normal = kNone;
     } else if (std::ranges::any_of(triangle, missing)) {
-      const glm::dvec3 a(positions[triangle[0].position]);
-      const glm::dvec3 flat = glm::cross(glm::dvec3(positions[triangle[1].position]) - a,
-                                         glm::dvec3(positions[triangle[2].position]) - a);
-      const auto index = static_cast<std::uint32_t>(soup.normals.size());
+      const auto index = static_cast<std::uint32_t>(normals.size());
       for (Corner& corner : triangle) {
         if (missing(corner)) corner.normal = index;
       }
-      soup.normals.emplace_back(flat / glm::length(flat));
+      normals.push_back(flat_normal(positions[triangle[0].position],
+                                    positions[triangle[1].position],
+                                    positions[triangle[2].position]));
     }
   }
-  if (!any) soup.normals.clear();
+  if (!any) normals.clear();
 }
 
 // Gives the texture coordinates (0, 0) to every corner that has none, unless no corner has any:
 // then all are removed.
 void complete_uvs(MeshSoup& soup, std::vector<Triangle>& triangles) {
-  for (glm::vec2& uv : soup.uvs) {
-    if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
-  }
+  for (glm::vec2& uv : soup.uvs.items()) uv = finite_or_zero(uv);
   const bool any = std::ranges::any_of(triangles, [](const Triangle& triangle) {
     return std::ranges::any_of(triangle, [](const Corner& c) { return c.uv != kNone; });
   });
@@ -157,7 +131,7 @@ void complete_uvs(MeshSoup& soup, std::vector<Triangle>& triangles) {
     return;
   }
   const auto zero = static_cast<std::uint32_t>(soup.uvs.size());
-  soup.uvs.emplace_back(0.0F, 0.0F);
+  soup.uvs.push_back(glm::vec2(0));
   for (Triangle& triangle : triangles) {
     for (Corner& corner : triangle) {
       if (corner.uv == kNone) corner.uv = zero;
@@ -221,8 +195,8 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
       const Corner& corner = triangles[i / 3][i % 3];
       vertex_of[i] = static_cast<std::uint32_t>(mesh.positions.size());
       mesh.positions.push_back(positions[corner.position]);
-      if (!soup.normals.empty()) mesh.normals.push_back(soup.normals[corner.normal]);
-      if (!soup.uvs.empty()) mesh.uvs.push_back(soup.uvs[corner.uv]);
+      if (!soup.normals.empty()) mesh.normals.push_back(soup.normals.items()[corner.normal]);
+      if (!soup.uvs.empty()) mesh.uvs.push_back(soup.uvs.items()[corner.uv]);
     }
     mesh.triangles[i / 3][i % 3] = vertex_of[first[i]];
   }
@@ -230,35 +204,50 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
 
 }  // namespace
 
-std::size_t MeshSoup::add_material(Material material, const std::filesystem::path& path) {
-  if (materials.size() == kMaxMaterials) refuse(path, "the file has more than 65,536 materials");
+std::size_t MeshSoup::add_material(Material material) {
+  if (materials.size() == kMaxMaterials) refuse(path_, "the file has more than 65,536 materials");
   materials.push_back(std::move(material));
   return materials.size() - 1;
 }
 
-void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material,
-                           const std::filesystem::path& path) {
-  if (polygon.size() > kMaxCorners - corners.size())
-    refuse(path, "the polygons have more than 2^28 corners");
-  corners.insert(corners.end(), polygon.begin(), polygon.end());
-  polygon_sizes.push_back(static_cast<std::uint32_t>(polygon.size()));
-  material_of.push_back(static_cast<std::uint16_t>(material));
+void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material) {
+  corners.append(polygon);
+  polygons.push_back(
+      {static_cast<std::uint32_t>(polygon.size()), static_cast<std::uint16_t>(material)});
+  if (polygons.size() % kItemsBetweenChecks == 0) check_room();
 }
 
 void MeshSoup::drop_uvs() {
   uvs.clear();
-  for (Corner& corner : corners) corner.uv = kNone;
+  uvs_dropped_ = true;
 }
 
-Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path) {
-  check_corners(soup, path);
+std::uint64_t MeshSoup::peak_bytes() const noexcept {
+  // Of each list itself, and of what build_mesh() makes of it before it is freed
+  return 36 * corners.size() + 24 * polygons.size() + 52 * positions.size() + 40 * normals.size() +
+         24 * uvs.size();
+}
+
+void MeshSoup::check_room() {
+  constexpr std::uint64_t kMaxCorners = std::uint64_t{1} << 28;  // of what build_mesh() can number
+  if (spilled() || (peak_bytes() <= room_.memory_bytes && corners.size() <= kMaxCorners)) return;
+  positions.spill(room_.temp_directory);
+  normals.spill(room_.temp_directory);
+  uvs.spill(room_.temp_directory);
+  corners.spill(room_.temp_directory);
+  polygons.spill(room_.temp_directory);
+}
+
+Mesh build_mesh(MeshSoup soup) {
+  check_corners(soup);
   Mesh mesh;
-  mesh.origin = checked_origin(soup, path);
+  mesh.origin = checked_origin(soup);
   std::vector<glm::vec3> positions;
   positions.reserve(soup.positions.size());
-  for (const glm::dvec3& position : soup.positions) positions.emplace_back(position - mesh.origin);
+  for (const glm::dvec3& position : soup.positions.items())
+    positions.emplace_back(position - mesh.origin);
   Soup made = make_triangles(soup, positions);
-  if (made.triangles.empty()) refuse(path, "the mesh has no triangle");
+  if (made.triangles.empty()) refuse(soup.path(), "the mesh has no triangle");
   complete_normals(soup, made.triangles, positions);
   complete_uvs(soup, made.triangles);
   share_vertices(soup, made.triangles, positions, mesh);
@@ -266,6 +255,18 @@ Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path) {
   mesh.materials = std::move(soup.materials);
   if (mesh.materials.empty()) mesh.materials.emplace_back();
   return mesh;
+}
+
+MeshFile mesh_file(MeshSoup soup, std::vector<MeshCamera> cameras,
+                   std::vector<std::string> warnings) {
+  soup.settle();
+  MeshFile file{.cameras = std::move(cameras), .warnings = std::move(warnings)};
+  if (soup.spilled()) {
+    file.spilled = std::make_shared<const SpilledMesh>(std::move(soup));
+  } else {
+    file.mesh = build_mesh(std::move(soup));
+  }
+  return file;
 }
 
 }  // namespace ptc

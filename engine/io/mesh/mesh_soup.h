@@ -17,6 +17,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <glm/mat3x3.hpp>
@@ -24,14 +25,17 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include "engine/io/file/spool.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/io/mesh/mesh_warnings.h"
 
 namespace ptc {
 
 /// Polygons over positions, normals and texture coordinates, each with indices of its own. Readers
-/// may add a polygon before its vertices, because only build_mesh() checks the indices.
-struct MeshSoup {
+/// may add a polygon before its vertices, because only build_mesh() checks the indices. What does
+/// not fit in the memory that a MeshRoom allows is on the disk.
+class MeshSoup {
+ public:
   static constexpr std::uint32_t kNone = 0xffffffff;  ///< index of a corner that lacks something
   /// A corner of a polygon: indices into positions, normals and uvs.
   struct Corner {
@@ -40,33 +44,70 @@ struct MeshSoup {
     std::uint32_t uv = kNone;
   };
 
-  std::vector<glm::dvec3> positions;  ///< world coordinates, scene units
-  std::vector<glm::vec3> normals;     ///< of any length; zero and non-finite ones count as missing
-  std::vector<glm::vec2> uvs;         ///< as Mesh::uvs
-  std::vector<Corner> corners;        ///< corners of all polygons, one polygon after another
-  std::vector<std::uint32_t> polygon_sizes;  ///< number of corners, per polygon
-  std::vector<std::uint16_t> material_of;    ///< index into materials, per polygon
-  std::vector<Material> materials;           ///< if empty, a material of default values is used
+  /// A polygon: some corners, one after another, and a material.
+  struct Polygon {
+    std::uint32_t corners = 0;   ///< number of them
+    std::uint16_t material = 0;  ///< index into materials
+  };
 
+  /// @param path  name of the file, for errors
+  MeshSoup(std::filesystem::path path, MeshRoom room)
+      : path_(std::move(path)), room_(std::move(room)) {}
+
+  Spool<glm::dvec3> positions;  ///< world coordinates, scene units
+  Spool<glm::vec3> normals;     ///< of any length; zero and non-finite ones count as missing
+  Spool<glm::vec2> uvs;         ///< as Mesh::uvs
+  Spool<Corner> corners;        ///< corners of all polygons, one polygon after another
+  Spool<Polygon> polygons;
+  std::vector<Material> materials;  ///< if empty, a material of default values is used
+
+  /// Returns the name of the file.
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  /// Says whether the lists are on the disk, because the mesh would not fit in memory.
+  [[nodiscard]] bool spilled() const noexcept { return positions.spilled(); }
+  /// Adds a position, world coordinates.
+  /// @throws LimitError, std::system_error as MeshRoom describes
+  void add_position(const glm::dvec3& position) {
+    positions.push_back(position);
+    if (positions.size() % kItemsBetweenChecks == 0) check_room();
+  }
   /// Adds a material and returns its index.
-  /// @param path  name of the file for the error
   /// @throws DataError when there are 65,536 materials already
-  std::size_t add_material(Material material, const std::filesystem::path& path);
+  std::size_t add_material(Material material);
   /// Adds a polygon with an index of a material.
-  /// @param path  name of the file for the error
-  /// @throws DataError when all polygons together would have more than 2^28 corners
-  void add_polygon(std::span<const Corner> polygon, std::size_t material,
-                   const std::filesystem::path& path);
+  /// @throws LimitError, std::system_error as MeshRoom describes
+  void add_polygon(std::span<const Corner> polygon, std::size_t material);
   /// Removes all texture coordinates. It is for readers that gave every corner an index before they
   /// knew that the file has no coordinates.
   void drop_uvs();
+  /// Returns a corner as readers gave it, but for what drop_uvs() removed.
+  [[nodiscard]] Corner valid(Corner corner) const noexcept {
+    if (uvs_dropped_) corner.uv = kNone;
+    return corner;
+  }
+  /// Ends the lists: leaves them in memory or on the disk, as MeshRoom describes.
+  void settle() { check_room(); }
+  /// Returns the memory that build_mesh() takes at its peak, bytes.
+  [[nodiscard]] std::uint64_t peak_bytes() const noexcept;
+
+ private:
+  static constexpr std::uint64_t kItemsBetweenChecks = 1 << 12;
+  void check_room();
+
+  std::filesystem::path path_;
+  MeshRoom room_;
+  bool uvs_dropped_ = false;
 };
 
 /// Builds the mesh of a soup: triangles over shared vertices, relative to an origin.
-/// @param path  name of the file for errors
 /// @throws DataError when an index is out of range, a position is not finite or too far from the
 ///         others, or no triangle is left
-[[nodiscard]] Mesh build_mesh(MeshSoup soup, const std::filesystem::path& path);
+/// @pre  the soup is not spilled
+[[nodiscard]] Mesh build_mesh(MeshSoup soup);
+/// Makes the content of a file: a mesh in memory or, of a soup that is spilled, one on the disk.
+/// @throws as build_mesh()
+[[nodiscard]] MeshFile mesh_file(MeshSoup soup, std::vector<MeshCamera> cameras,
+                                 std::vector<std::string> warnings);
 
 /// The work that the triangulation of a polygon took.
 struct TriangulationCounts {
@@ -150,10 +191,10 @@ class TextureLoader {
 
 // The readers of each format, as read_mesh() describes them.
 
-[[nodiscard]] MeshFile read_ply_mesh(const std::filesystem::path& path);
-[[nodiscard]] MeshFile read_off_mesh(const std::filesystem::path& path);
-[[nodiscard]] MeshFile read_obj_mesh(const std::filesystem::path& path);
-[[nodiscard]] MeshFile read_gltf_mesh(const std::filesystem::path& path);
-[[nodiscard]] MeshFile read_stl_mesh(const std::filesystem::path& path);
+[[nodiscard]] MeshFile read_ply_mesh(const std::filesystem::path& path, const MeshRoom& room);
+[[nodiscard]] MeshFile read_off_mesh(const std::filesystem::path& path, const MeshRoom& room);
+[[nodiscard]] MeshFile read_obj_mesh(const std::filesystem::path& path, const MeshRoom& room);
+[[nodiscard]] MeshFile read_gltf_mesh(const std::filesystem::path& path, const MeshRoom& room);
+[[nodiscard]] MeshFile read_stl_mesh(const std::filesystem::path& path, const MeshRoom& room);
 
 }  // namespace ptc

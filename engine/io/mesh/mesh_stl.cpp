@@ -19,11 +19,12 @@ constexpr std::size_t kTriangleBytes = 50;  // normal, three positions, 16 bits 
 
 class StlMesh {
  public:
-  explicit StlMesh(const std::filesystem::path& path) : path_(path) {}
+  StlMesh(const std::filesystem::path& path, const MeshRoom& room)
+      : path_(path), soup_(path, room) {}
 
   MeshFile read() {
     if (!read_binary()) read_text();
-    return {build_mesh(std::move(soup_), path_), {}, {}};
+    return mesh_file(std::move(soup_), {}, {});
   }
 
  private:
@@ -83,11 +84,11 @@ class StlMesh {
   void add_corner(const glm::dvec3& position) {
     corners_.push_back(
         {static_cast<std::uint32_t>(soup_.positions.size()), MeshSoup::kNone, MeshSoup::kNone});
-    soup_.positions.push_back(position);
+    soup_.add_position(position);
   }
 
   void end_facet() {
-    soup_.add_polygon(corners_, 0, path_);
+    soup_.add_polygon(corners_, 0);
     corners_.clear();
   }
 
@@ -98,8 +99,8 @@ class StlMesh {
 
 }  // namespace
 
-MeshFile read_stl_mesh(const std::filesystem::path& path) {
-  return StlMesh(path).read();
+MeshFile read_stl_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+  return StlMesh(path, room).read();
 }
 
 }  // namespace ptc

@@ -48,6 +48,7 @@
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/temporary_container.h"
 #include "engine/scan/scan.h"
+#include "engine/scene/sampling/streamed_sampler.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
 #include "engine/sort/spill.h"
@@ -205,6 +206,28 @@ class Build {
     return budget_of(request_.run.memory_bytes, "this scene's build");
   }
 
+  /// Returns the memory for meshes. While they are read, nothing else takes any.
+  [[nodiscard]] MeshLimits mesh_limits() const {
+    const MemoryBudget budget = build_budget();
+    const std::uint64_t sampling = sampling_bytes(0, request_.sampling.count, 1);
+    // A mesh takes a quarter or less of what reading it takes, and leaves room for streaming. One
+    // that takes less than streaming does is better in memory
+    constexpr std::uint64_t kLeast = StreamingRoom::kLeastBytes;
+    const std::uint64_t room = std::max(sampling_room(budget, 0), 2 * kLeast) - kLeast;
+    return {.reading = std::min(std::max(budget.left(), kLeast), 4 * room),
+            .traced = std::max(sampling_room(budget, sampling), kLeast),
+            .temp_directory = roomiest_temp_dir(request_.run, target_)};
+  }
+
+  /// Returns the memory for sampling that the rest of a build leaves at least.
+  /// @param fixed  bytes that sampling takes in any case
+  [[nodiscard]] std::uint64_t sampling_room(const MemoryBudget& budget, std::uint64_t fixed) const {
+    const std::uint64_t others =
+        fixed + kMinSortBytes + held_pages_bytes(request_.page_shift) +
+        ContainerWriter::writing_bytes(request_.page_shift, executor_.threads());
+    return budget.left() > others ? budget.left() - others : 0;
+  }
+
   /// The settings of the sort of points, and of each of the sorts of attributes.
   struct AllSortOptions {
     SortOptions points, attributes;
@@ -250,8 +273,8 @@ class Build {
   /// Feeds all inputs to a sort, which writes them to the disk when memory does not hold them.
   SortedPoints sort() {
     // Read and measure the inputs, choose the frame
-    BuildInputs inputs =
-        read_inputs(request_, bounds_from_, scene_.get(), report_.seconds, progress_);
+    BuildInputs inputs = read_inputs(request_, bounds_from_, scene_.get(), mesh_limits(),
+                                     report_.seconds, progress_);
     report_.las_records = std::move(inputs.clouds.las_records);
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
@@ -266,10 +289,16 @@ class Build {
         if (!texts.contains(key)) inputs.clouds.text.erase(key);
       }
     }
+    if (inputs.streamed) {
+      progress_.note(
+          "the meshes do not fit in memory: they are sampled from the disk, and lit by rays at the "
+          "surfels");
+    }
     if (inputs.relight) light_later(inputs);
     Meta meta = make_meta(request_, inputs);
     if (inputs.clouds.scan && inputs.clouds.points > 0) add_marks(meta);
-    check_meta(record(meta, 0), request_.page_shift, kPointBytes, inputs.lit ? kSpacingBytes : 0);
+    check_meta(record(meta, 0), request_.page_shift, kPointBytes,
+               inputs.has_meshes() ? kSpacingBytes : 0);
     SortedPoints points{
         .plan = {.frame = frame_of(inputs.bounds),
                  .scan = inputs.clouds.scan,
@@ -277,20 +306,32 @@ class Build {
     const Frame& frame = points.plan.frame;
 
     // Charge the inputs to the memory cap
+    SamplingRoom room;
     MemoryBudget budget = build_budget();
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
       charge_mesh(budget, lit->mesh, &lit->rays);
-      budget.charge("sampling", sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count,
-                                               executor_.threads()));
+      const std::uint64_t fixed =
+          sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count, 0);
+      room.at_once = static_cast<unsigned>(std::clamp<std::uint64_t>(
+          sampling_room(budget, fixed) / kSampledPatchBytes, 1, executor_.threads()));
+      budget.charge("sampling", fixed + room.at_once * kSampledPatchBytes);
+    }
+    if (const StreamedMeshes* streamed = inputs.streamed.get()) {
+      budget.charge("the meshes", streamed->parts.bytes());
+      const std::uint64_t fixed = streaming_bytes(streamed->found, request_.sampling);
+      room.streaming.memory_bytes =
+          std::clamp(sampling_room(budget, fixed) / 2, StreamingRoom::kLeastBytes,
+                     std::max(8U, executor_.threads()) * StreamingRoom::kLeastBytes);
+      budget.charge("sampling", fixed + room.streaming.memory_bytes);
     }
 
     // Start the sort, and check that the disks have room. How many surfels a given spacing makes of
     // a mesh is not known beforehand
     const std::uint64_t known = request_.city_points + inputs.clouds.points;
-    const bool by_spacing = inputs.lit && request_.sampling.spacing > 0;
+    const bool by_spacing = inputs.has_meshes() && request_.sampling.spacing > 0;
     const std::uint64_t expected =
-        by_spacing ? 0 : known + (inputs.lit ? request_.sampling.count : 0);
+        by_spacing ? 0 : known + (inputs.has_meshes() ? request_.sampling.count : 0);
     const std::size_t groups = inputs.attributes.groups();
     const AllSortOptions options =
         sort_options(std::move(budget), expected, points.plan.emits, groups);
@@ -308,9 +349,12 @@ class Build {
     // Feed the points, then plan the container: its record and its UUID depend on all of them
     double spacing = 0;
     {
-      const Stage stage(report_.seconds, progress_, inputs.lit ? "sample and light" : "partition",
-                        known, "points");
-      spacing = feed_inputs(inputs, request_, frame, scene_points(), *points.sorter,
+      const char* const name = inputs.lit        ? "sample and light"
+                               : inputs.streamed ? "sample"
+                                                 : "partition";
+      const Stage stage(report_.seconds, progress_, name, known, "points");
+      room.streaming.temp_dirs = options.points.temp_dirs;
+      spacing = feed_inputs(inputs, request_, frame, scene_points(), room, *points.sorter,
                             *points.attributes, executor_, progress_);
     }
     points.plan.meta = record(meta, spacing);

@@ -4,9 +4,9 @@
 //   clouds ---- read ------------+--> external sort ----> octree, pages ----> target.ptcx
 //   city ------ generate --------'    by Morton key       in one pass         published by rename
 //
-// Memory stays within a cap however many points there are: points that do not fit go through
-// temporary files. The result depends on the request alone, not on the cap, the number of threads
-// or the directories.
+// Memory stays within a cap however many points and triangles there are: what does not fit goes
+// through temporary files. The result depends on the request alone, not on the number of threads or
+// the directories, and on the cap only where meshes do not fit (RunOptions).
 //
 //   ptc::BuildRequest request;
 //   request.inputs = {"dragon.obj"};

@@ -1,6 +1,6 @@
 // Two passes over the inputs of a build.
 //
-//   read_inputs()   files --> bounds, about 2^16 sample positions, meshes in memory
+//   read_inputs()   files --> bounds, about 2^16 sample positions, meshes in memory or spilled
 //   feed_inputs()   files, meshes, city --> blocks of 2^14 surfels --> records --> sort
 //
 // Clouds are read twice, so that their points never have to fit in memory. The second pass counts
@@ -22,7 +22,6 @@
 #include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
-#include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/convert/convert.h"
@@ -261,7 +260,7 @@ void load_recorded_sky(const BuildRequest& request, BuildInputs& inputs) {
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
-                       Progress& progress) {
+                       const MeshLimits& limits, Progress& progress) {
   BuildInputs inputs;
   const bool alone = request.inputs.size() == 1 && !request.mesh && !scene;
   for (const auto& input : request.inputs) {
@@ -280,8 +279,9 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
-  Mesh mesh = load_meshes(request.inputs, request.mesh.get(), request.backdrop, progress);
-  plan_channels(request, scene, !mesh.triangles.empty(), inputs, progress);
+  LoadedMeshes meshes =
+      load_meshes(request.inputs, request.mesh.get(), request.backdrop, limits, progress);
+  plan_channels(request, scene, !meshes.empty(), inputs, progress);
   if (request.lights) {
     inputs.lights = *request.lights;
   } else if (const std::string& lights = inputs.clouds.text[kLightsKey]; !lights.empty()) {
@@ -289,9 +289,16 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   } else if (inputs.clouds.unlit) {
     inputs.lights = cloud_rig(up_of(inputs.clouds.text));
   }
-  inputs.emitters = mesh.emits();
-  plan_light(request, scene, !mesh.triangles.empty(), inputs);
-  if (mesh.triangles.empty()) {
+  if (meshes.parts) {
+    SurfaceSurvey found = survey(*meshes.parts, kSampleKeys);
+    inputs.emitters = found.emits;
+    inputs.streamed = std::make_unique<StreamedMeshes>(
+        StreamedMeshes{std::move(*meshes.parts), std::move(found)});
+  } else {
+    inputs.emitters = meshes.mesh.emits();
+  }
+  plan_light(request, scene, !meshes.empty(), inputs);
+  if (meshes.empty()) {
     if (inputs.relight && !request.lights) load_recorded_sky(request, inputs);
     return inputs;
   }
@@ -300,6 +307,18 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   } else if (!request.lights && !inputs.emitters) {
     inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
+  if (inputs.streamed) {
+    // Rays at the surfels light them, once all are in the container
+    inputs.relight = true;
+    inputs.rays_at_emitters = false;
+    const StreamedMeshes& streamed = *inputs.streamed;
+    inputs.bounds.add(streamed.parts.bounds());
+    inputs.sample.insert(inputs.sample.end(), streamed.found.by_area.begin(),
+                         streamed.found.by_area.end());
+    return_freed_memory();
+    return inputs;
+  }
+  Mesh& mesh = meshes.mesh;
   inputs.bounds.add(mesh.bounds());
   const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
@@ -403,15 +422,15 @@ void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
 }
 
 BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
-                        StageSeconds& seconds, Progress& progress) {
+                        const MeshLimits& limits, StageSeconds& seconds, Progress& progress) {
   if (request.city_points > 0) return lay_city(request.city_points);
   const Stage stage(seconds, progress, "read", 0, "points");
-  return read_files(request, from, scene, progress);
+  return read_files(request, from, scene, limits, progress);
 }
 
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   std::uint64_t first, ExternalSorter& sorter, AttributeSorts& attributes,
-                   const Executor& executor, Progress& progress) {
+                   std::uint64_t first, const SamplingRoom& room, ExternalSorter& sorter,
+                   AttributeSorts& attributes, const Executor& executor, Progress& progress) {
   Feeder feeder(inputs.attributes, frame, first, sorter, attributes, executor, progress);
   if (request.city_points > 0) feeder.feed(*make_city(request.city_points));
   for (const Clouds::Cloud& cloud : inputs.clouds.files) {
@@ -425,9 +444,16 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
                                            : spacing_for(lit->mesh, request.sampling.count);
     SamplingOptions sampling = request.sampling;
     if (!inputs.rays_at_emitters) sampling.lights.area_rays = 0;
-    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor));
+    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor, room.at_once));
   }
   inputs.lit.reset();
+  if (const StreamedMeshes* streamed = inputs.streamed.get()) {
+    const SamplingOptions sampling = with_spacing(request.sampling, streamed->found.area);
+    spacing = sampling.spacing;
+    feeder.feed(
+        *sample_parts(streamed->parts, streamed->found, sampling, room.streaming, executor));
+  }
+  inputs.streamed.reset();
   return spacing;
 }
 

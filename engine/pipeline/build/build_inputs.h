@@ -19,11 +19,14 @@
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/meshes.h"
 #include "engine/scan/scan.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
+#include "engine/scene/sampling/mesh_parts.h"
 #include "engine/scene/sampling/solids.h"
+#include "engine/scene/sampling/streamed_sampler.h"
 #include "engine/sort/external_sort.h"
 
 namespace ptc {
@@ -105,6 +108,12 @@ struct LitMesh {
   DirectLight light;
 };
 
+/// Meshes that do not fit in memory, and what a survey found of them.
+struct StreamedMeshes {
+  MeshParts parts;
+  SurfaceSurvey found;
+};
+
 /// The measured inputs of a build, and what the sort must know about them beforehand.
 struct BuildInputs {
   Bounds bounds;                   ///< of all inputs, scene units; empty when they have no points
@@ -117,27 +126,38 @@ struct BuildInputs {
   /// Whether the points are lit once all of them are in the container, since not every one of them
   /// has the light of all lamps yet (spec/shading.md#mixed-light). Meshes then stay dark at first.
   bool relight = false;
-  std::unique_ptr<LitMesh> lit;  ///< null when the inputs have no triangles
+  std::unique_ptr<LitMesh> lit;              ///< null when no meshes are in memory
+  std::unique_ptr<StreamedMeshes> streamed;  ///< null when no meshes are on the disk
+
+  [[nodiscard]] bool has_meshes() const noexcept { return lit || streamed; }
 };
 
 /// Reads the meshes and measures the clouds of a request.
 /// @param from     where the bounds of clouds may come from
 /// @param scene    container that the inputs are appended to, whose channels become input 0 of the
 ///                 plan; null: there is none
+/// @param limits   of the meshes
 /// @param seconds  gets a row for the stage "read", except for a city
 /// @throws DataError, FormatError, std::system_error
 [[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
-                                      const ContainerReader* scene, StageSeconds& seconds,
-                                      Progress& progress);
+                                      const ContainerReader* scene, const MeshLimits& limits,
+                                      StageSeconds& seconds, Progress& progress);
+
+/// What the sampling of meshes may use.
+struct SamplingRoom {
+  unsigned at_once = 0;     ///< patches of a mesh in memory, as for sample_mesh()
+  StreamingRoom streaming;  ///< of meshes on the disk
+};
 
 /// Feeds the surfels of all inputs to the sort, and what is recorded of them beyond that to the
 /// sorts of attributes. Meshes are sampled and lit on the way, and freed afterwards.
 /// @param first  number of points that the container has before these
+/// @param room    for sampling
 /// @return  distance between neighbouring surfels on the meshes, scene units; 0 without meshes
 /// @throws BoundsExceeded; DataError when a cloud changed since it was measured; std::system_error
 double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   std::uint64_t first, ExternalSorter& sorter, AttributeSorts& attributes,
-                   const Executor& executor, Progress& progress);
+                   std::uint64_t first, const SamplingRoom& room, ExternalSorter& sorter,
+                   AttributeSorts& attributes, const Executor& executor, Progress& progress);
 
 /// Returns the coordinates of a point as the array that Frame takes.
 [[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) {

@@ -33,8 +33,8 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   meta.text[kInputsKey] = names;
   meta.text[kLightsKey] = lights_record(inputs.lights);
   if (inputs.rays_at_emitters) meta.text[kEmittersKey] = "baked";
-  if (inputs.clouds.unlit && !inputs.lit) meta.text[kSkyLightKey] = "gathered";
-  const bool assumed = inputs.clouds.points > 0 && !inputs.clouds.coloured && !inputs.lit;
+  if (inputs.clouds.unlit && !inputs.has_meshes()) meta.text[kSkyLightKey] = "gathered";
+  const bool assumed = inputs.clouds.points > 0 && !inputs.clouds.coloured && !inputs.has_meshes();
   if (assumed) meta.text[kAlbedoKey] = kAssumed;
   if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);

@@ -36,9 +36,8 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
   append_mesh(mesh, box, glm::dmat4(1), field);
 }
 
-/// Appends a ground below the mesh and a red wall to its left.
-void add_backdrop(Mesh& mesh, const char* field) {
-  const Bounds bounds = mesh.bounds();
+/// Makes a ground below a box and a red wall to its left.
+void add_backdrop(Mesh& mesh, const Bounds& bounds, const char* field) {
   const glm::dvec3 extent = bounds.high - bounds.low;
   const double size = std::max({extent.x, extent.y, extent.z});
   const glm::dvec3 middle = (bounds.low + bounds.high) * 0.5;
@@ -52,41 +51,93 @@ void add_backdrop(Mesh& mesh, const char* field) {
           {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)}, field);
 }
 
+/// Joins meshes: in memory as long as they fit, else as parts.
+class Joiner {
+ public:
+  Joiner(const MeshLimits& limits, const char* field) : limits_(limits), field_(field) {}
+
+  /// Returns the room that is left for another mesh.
+  [[nodiscard]] MeshRoom room() const {
+    const std::uint64_t held = parts_ ? parts_->bytes() : bytes_of(mesh_);
+    return {limits_.reading > held ? limits_.reading - held : 0, limits_.temp_directory};
+  }
+
+  // The first mesh is taken over, so that a single one is never copied
+  template <class M>
+  void add(M&& mesh) {
+    if (parts_) {
+      parts_->add(std::forward<M>(mesh));
+    } else if (mesh_.triangles.empty()) {
+      mesh_ = std::forward<M>(mesh);
+    } else {
+      append_mesh(mesh_, mesh, glm::dmat4(1), field_);
+      joined_ = true;
+    }
+  }
+  void add(std::shared_ptr<const SpilledMesh> mesh) {
+    divide();
+    parts_->add(std::move(mesh));
+  }
+
+  [[nodiscard]] LoadedMeshes take(bool backdrop) {
+    if (joined_) check_mesh(mesh_, field_);  // meshes may lie too far from each other
+    if (traced_bytes() > limits_.traced) divide();
+    if (backdrop && parts_) {
+      Mesh boxes;
+      add_backdrop(boxes, parts_->bounds(), field_);
+      parts_->add(std::move(boxes));
+    } else if (backdrop && !mesh_.triangles.empty()) {
+      add_backdrop(mesh_, mesh_.bounds(), field_);
+    }
+    return {std::move(mesh_), std::move(parts_)};
+  }
+
+ private:
+  /// Returns the memory of the mesh with what rays at it and its sampling take.
+  [[nodiscard]] std::uint64_t traced_bytes() const {
+    constexpr std::uint64_t kRayBytes = 90, kSamplingBytes = 24;  // for each triangle
+    return bytes_of(mesh_) + mesh_.triangles.size() * (kRayBytes + kSamplingBytes);
+  }
+  void divide() {
+    if (parts_) return;
+    parts_ = std::make_unique<MeshParts>();
+    parts_->add(std::exchange(mesh_, {}));
+  }
+
+  MeshLimits limits_;
+  const char* field_;
+  Mesh mesh_;
+  std::unique_ptr<MeshParts> parts_;
+  bool joined_ = false;
+};
+
 }  // namespace
 
-Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also, bool backdrop,
-                 Progress& progress, std::vector<MeshCamera>* cameras, const char* field) {
-  // The first mesh is taken over, so that a single one is never copied
-  Mesh mesh;
-  bool joined = false;
-  const auto join = [&]<class M>(M&& other) {
-    if (mesh.triangles.empty()) {
-      mesh = std::forward<M>(other);
-    } else {
-      append_mesh(mesh, other, glm::dmat4(1), field);
-      joined = true;
-    }
-  };
-
+LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
+                         bool backdrop, const MeshLimits& limits, Progress& progress,
+                         std::vector<MeshCamera>* cameras, const char* field) {
   // Read the mesh files
+  Joiner joiner(limits, field);
   for (const std::filesystem::path& input : inputs) {
     if (holds_points(input)) continue;
-    MeshFile file = read_mesh(input);
+    MeshFile file = read_mesh(input, joiner.room());
     for (const std::string& warning : file.warnings) {
       progress.note(input.string() + ": " + warning);
     }
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
-    join(std::move(file.mesh));
+    if (file.spilled) {
+      joiner.add(std::move(file.spilled));
+    } else {
+      joiner.add(std::move(file.mesh));
+    }
   }
 
   // Add the mesh in memory and the backdrop
   if (also) {
     check_mesh(*also);
-    join(*also);
+    joiner.add(*also);
   }
-  if (joined) check_mesh(mesh, field);  // meshes may lie too far from each other
-  if (backdrop && !mesh.triangles.empty()) add_backdrop(mesh, field);
-  return mesh;
+  return joiner.take(backdrop);
 }
 
 Bounds bounds_before_backdrop(const Mesh& mesh) {

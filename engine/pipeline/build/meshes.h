@@ -1,29 +1,54 @@
 // Loads the meshes of a request, for sampling and for rendering.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <limits>
+#include <memory>
 #include <vector>
 
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
+#include "engine/scene/sampling/mesh_parts.h"
 
 namespace ptc {
 
-/// Reads meshes and joins them into one. Clouds among the inputs are skipped.
+/// The memory that meshes may take, and where those go that take more.
+struct MeshLimits {
+  /// Cap while meshes are read, bytes.
+  std::uint64_t reading = std::numeric_limits<std::uint64_t>::max();
+  /// Cap of the meshes and of what rays at them and their sampling need, bytes.
+  std::uint64_t traced = std::numeric_limits<std::uint64_t>::max();
+  std::filesystem::path temp_directory = ".";
+};
+
+/// The meshes of a request.
+struct LoadedMeshes {
+  Mesh mesh;  ///< all of them, joined; without triangles when there is none, or when `parts` has
+              ///< them
+  std::unique_ptr<MeshParts> parts;  ///< all of them, where they do not fit in memory; else null
+
+  [[nodiscard]] bool empty() const noexcept { return mesh.triangles.empty() && !parts; }
+};
+
+/// Reads meshes and joins them into one. Clouds among the inputs are skipped. Meshes that take more
+/// memory than they may, to be read and to be traced by rays, are left on the disk.
 /// @param also      a mesh in memory, joined after those of the inputs; null: none
+/// @param limits    of all meshes together
 /// @param backdrop  sets the meshes on a ground in front of a red wall
 /// @param progress  gets the warnings of each file as notes that begin with its name
 /// @param cameras   gets the cameras of the files, in their order; may be null
-/// @return          the joined mesh; without triangles when there is none to read
 /// @param field     the member of the request that names the inputs, for errors
 /// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
 ///         `also` or the joined mesh, or append_mesh() refuses to join them; std::system_error
-[[nodiscard]] Mesh load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
-                               bool backdrop, Progress& progress,
-                               std::vector<MeshCamera>* cameras = nullptr,
-                               const char* field = "inputs");
+[[nodiscard]] LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs,
+                                       const Mesh* also, bool backdrop, const MeshLimits& limits,
+                                       Progress& progress,
+                                       std::vector<MeshCamera>* cameras = nullptr,
+                                       const char* field = "inputs");
 
 /// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
+/// @pre the mesh is in memory
 [[nodiscard]] Bounds bounds_before_backdrop(const Mesh& mesh);
 
 }  // namespace ptc

@@ -213,7 +213,6 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                          Progress& progress) {
   // Open the scene, and choose the lights
   LightReport report;
-  const ThreadPool executor(request.run.threads);
   const ContainerReader scene(request.scene);
   const LightRig rig =
       normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
@@ -232,30 +231,37 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                                      "emits: give a light");
   }
 
-  // Divide the memory, and collect what emits
-  MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
-  budget.charge("emitters", 160 * report.emitters);
-  budget.charge("the output's directory",
-                ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift,
-                                              executor.threads()) +
-                    held_pages_bytes(scene.header().page_shift));
+  // Divide the memory among as many threads as it allows, and collect what emits
   const auto sky = sky_function(rig.sky);
   const bool by_rays = emitting > 0 || has_lamps(rig);
-  if (by_rays) {
-    budget.charge("shadow rays",
-                  executor.threads() * DiscLight::thread_bytes(rig, request.light_sampling));
-  }
-  budget.require();
-  const unsigned lights_at_once = executor.threads() * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
-  const unsigned readers = lights_at_once + (sky ? executor.threads() : 0);
+  const auto lights_with = [&](unsigned threads) {
+    return threads * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
+  };
+  const auto readers_with = [&](unsigned threads) {
+    return lights_with(threads) + (sky ? threads : 0);
+  };
+  const auto cache_bytes_with = [&](unsigned threads) {
+    MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
+    budget.charge("emitters", 160 * report.emitters);
+    budget.charge(
+        "the output's directory",
+        ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads) +
+            held_pages_bytes(scene.header().page_shift));
+    if (by_rays) {
+      budget.charge("shadow rays", threads * DiscLight::thread_bytes(rig, request.light_sampling));
+    }
+    budget.require();
+    if (readers_with(threads) == 0) return std::uint64_t{0};
+    return cache_bytes_left(std::move(budget), scene, lights_with(threads), readers_with(threads),
+                            request.back_end);
+  };
+  const auto [threads, cache_bytes] = threads_that_fit(request.run, cache_bytes_with);
+  const ThreadPool executor(threads);
   std::unique_ptr<PageCache> cache;
-  if (readers > 0) {
+  if (const unsigned readers = readers_with(threads); readers > 0) {
     cache = std::make_unique<PageCache>(
-        scene,
-        CacheOptions{.memory_bytes = cache_bytes_left(std::move(budget), scene, lights_at_once,
-                                                      readers, request.back_end),
-                     .threads = readers,
-                     .back_end = request.back_end});
+        scene, CacheOptions{
+                   .memory_bytes = cache_bytes, .threads = readers, .back_end = request.back_end});
   }
 
   const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],

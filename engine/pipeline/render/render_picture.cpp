@@ -84,12 +84,26 @@ struct Part {
   std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
 };
 
+/// Returns the memory for meshes. While they are read, nothing else takes any.
+MeshLimits mesh_limits(const RenderRequest& request) {
+  constexpr std::uint64_t kOthers = std::uint64_t{96} << 20;  // a tile, rows, a gather, its pages
+  constexpr std::uint64_t kLeast = std::uint64_t{26} << 20;   // refused rather than not seen
+  const std::uint64_t left = budget_of(request.run.memory_bytes, "this picture").left();
+  return {.reading = left,
+          .traced = std::max(left > kOthers ? left - kOthers : 0, kLeast),
+          .temp_directory = roomiest_temp_dir(request.run, request.scene)};
+}
+
 /// Loads the meshes and finds the camera.
 void load_subject(Subject& subject, const RenderRequest& request, const Part& part,
                   const ContainerReader& scene, Progress& progress) {
   std::vector<MeshCamera> cameras;
-  subject.mesh = load_meshes(request.meshes, request.mesh.get(), request.backdrop, progress,
-                             &cameras, "meshes");
+  LoadedMeshes meshes = load_meshes(request.meshes, request.mesh.get(), request.backdrop,
+                                    mesh_limits(request), progress, &cameras, "meshes");
+  if (meshes.parts) {
+    progress.note("the meshes do not fit in memory: the camera sees the surfels");
+  }
+  subject.mesh = std::move(meshes.mesh);
   if (!part.emission) {
     for (Material& material : subject.mesh.materials) material.emission = glm::vec3(0);
   }
@@ -391,9 +405,9 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   const LightRig rig = request.lights ? *request.lights : recorded_lights(scene, progress);
   check_names(request, targets, rig.sky.map_path);
   Progress silent;
-  const bool emits =
-      may_emit(scene) ||
-      load_meshes(request.meshes, request.mesh.get(), false, silent, nullptr, "meshes").emits();
+  const bool emits = may_emit(scene) || load_meshes(request.meshes, request.mesh.get(), false,
+                                                    mesh_limits(request), silent, nullptr, "meshes")
+                                            .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
   const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
   LightingReport report;

@@ -31,6 +31,14 @@ struct SamplingOptions {
 /// @throws RequestError when count, spacing or a number of the camera makes no sense
 void check_sampling(const SamplingOptions& options);
 
+/// Checks the options, and completes them with the spacing that their count asks for.
+/// @param area  of the mesh, scene units squared, where both sides of double-sided materials count
+/// @throws RequestError when an option makes no sense, or there would be more than 9 * 10^10
+///         surfels
+[[nodiscard]] SamplingOptions with_spacing(SamplingOptions options, double area);
+/// Returns the area of a mesh, where both sides of double-sided materials count.
+[[nodiscard]] double sampled_area(const Mesh& mesh);
+
 /// Returns the spacing that gives about `count` surfels on the mesh: sqrt(area / count), where both
 /// sides of double-sided materials count. It is 0 for a mesh without area.
 /// @throws RequestError when count is 0
@@ -50,15 +58,20 @@ void check_sampling(const SamplingOptions& options);
 /// The result is deterministic for any thread count. Its order is roughly that of the Z-curve.
 /// Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
+/// @param at_once  patches that are made at the same time, at most; 0: one for each thread
 /// @throws RequestError when count, spacing or a camera's number makes no sense, or there
 ///         would be more than 9 * 10^10 surfels
 [[nodiscard]] std::unique_ptr<PointSource> sample_mesh(const DirectLight& light,
                                                        const RayScene& scene,
                                                        const SamplingOptions& options,
-                                                       const Executor& executor);
+                                                       const Executor& executor,
+                                                       unsigned at_once = 0);
+/// The bytes that a patch takes while its surfels are made.
+inline constexpr std::uint64_t kSampledPatchBytes = std::uint64_t{20} << 20;
 /// Returns the bytes that sampling takes in addition to the mesh: 24 for each triangle or for each
-/// thousand surfels, whichever are more, and 20 MiB for each thread.
+/// thousand surfels, whichever are more, and kSampledPatchBytes for each patch.
+/// @param at_once  as for sample_mesh(), above 0
 [[nodiscard]] std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
-                                           unsigned threads) noexcept;
+                                           unsigned at_once) noexcept;
 
 }  // namespace ptc

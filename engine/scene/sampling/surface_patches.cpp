@@ -242,37 +242,61 @@ class Spread {
 
 SurfacePatches::SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels)
     : mesh_(mesh), field_(field) {
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) cut(i, whole_triangle(mesh, i), 1);
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    cut_into_pieces(whole_triangle(mesh, i), field, mesh.origin,
+                    [&](const SubTriangle& /*shape*/, std::uint32_t path) {
+                      pieces_.push_back({i, path});
+                    });
+  }
   sort_along_curve();
   join(surfels);
 }
 
-SubTriangle SurfacePatches::shape_of(const Piece& piece) const {
-  SubTriangle shape = whole_triangle(mesh_, piece.triangle);
-  for (std::uint32_t bit = std::bit_floor(piece.path) >> 1; bit != 0; bit >>= 1) {
-    shape = shape.half((piece.path & bit) != 0);
+double spacing_of(const SubTriangle& shape, const SpacingField& field, const glm::dvec3& origin) {
+  // Ask for a ball around the piece: no corner is farther from the centre than two thirds of the
+  // longest edge.
+  return field.at(origin + shape.centre(), 0.67 * shape.longest_edge());
+}
+
+void cut_into_pieces(const SubTriangle& triangle, const SpacingField& field,
+                     const glm::dvec3& origin,
+                     const std::function<void(const SubTriangle&, std::uint32_t path)>& take) {
+  const double widest = field.varies() ? kVaryingPieceSpacings : kPieceSpacings;
+  const auto cut = [&](const auto& self, const SubTriangle& shape, std::uint32_t path) -> void {
+    const double area = shape.area();
+    if (!(area > 0)) return;
+    const double spacing = spacing_of(shape, field, origin);
+    if (shape.longest_edge() <= widest * spacing || area <= kPieceWeight * spacing * spacing ||
+        path >= kDeepest) {
+      take(shape, path);
+      return;
+    }
+    self(self, shape.half(false), path << 1);
+    self(self, shape.half(true), path << 1 | 1u);
+  };
+  cut(cut, triangle, 1);
+}
+
+SubTriangle piece_of(const SubTriangle& triangle, std::uint32_t path) {
+  SubTriangle shape = triangle;
+  for (std::uint32_t bit = std::bit_floor(path) >> 1; bit != 0; bit >>= 1) {
+    shape = shape.half((path & bit) != 0);
   }
   return shape;
 }
 
-double SurfacePatches::spacing_of(const SubTriangle& shape) const {
-  // Ask for a ball around the piece: no corner is farther from the centre than two thirds of the
-  // longest edge.
-  return field_.at(mesh_.origin + shape.centre(), 0.67 * shape.longest_edge());
+std::uint64_t piece_place(const glm::dvec3& offset, double widest) {
+  return place_on_curve(offset, widest, 21);
 }
 
-void SurfacePatches::cut(std::uint32_t triangle, const SubTriangle& shape, std::uint32_t path) {
-  const double area = shape.area();
-  if (!(area > 0)) return;
-  const double spacing = spacing_of(shape);
-  const double widest = field_.varies() ? kVaryingPieceSpacings : kPieceSpacings;
-  if (shape.longest_edge() <= widest * spacing || area <= kPieceWeight * spacing * spacing ||
-      path >= kDeepest) {
-    pieces_.push_back({triangle, path});
-    return;
-  }
-  cut(triangle, shape.half(false), path << 1);
-  cut(triangle, shape.half(true), path << 1 | 1u);
+std::uint64_t surfels_of(double weight) noexcept {
+  // The first patch has one surfel at least
+  if (weight == 0) return 0;
+  return static_cast<std::uint64_t>(std::max(1.0, std::round(weight)));
+}
+
+SubTriangle SurfacePatches::shape_of(const Piece& piece) const {
+  return piece_of(whole_triangle(mesh_, piece.triangle), piece.path);
 }
 
 void SurfacePatches::sort_along_curve() {
@@ -284,7 +308,7 @@ void SurfacePatches::sort_along_curve() {
   std::vector<std::pair<std::uint64_t, Piece>> keyed;
   keyed.reserve(pieces_.size());
   for (const Piece& piece : pieces_) {
-    keyed.emplace_back(place_on_curve(shape_of(piece).centre() - bounds.low, widest, 21), piece);
+    keyed.emplace_back(piece_place(shape_of(piece).centre() - bounds.low, widest), piece);
   }
   // Sort by place, and by name among equal places, so that the order is the same everywhere.
   std::sort(keyed.begin(), keyed.end(), [](const auto& a, const auto& b) {
@@ -303,7 +327,7 @@ void SurfacePatches::join(double surfels) {
   double sum = 0;
   for (std::size_t i = 0; i < pieces_.size(); ++i) {
     const SubTriangle shape = shape_of(pieces_[i]);
-    const double spacing = spacing_of(shape);
+    const double spacing = spacing_of(shape, field_, mesh_.origin);
     sum += shape.area() / (spacing * spacing);
     if (sum - weights_.back() < surfels && i + 1 < pieces_.size()) continue;
     begins_.push_back(i + 1);
@@ -317,15 +341,8 @@ void SurfacePatches::join(double surfels) {
   }
 }
 
-std::uint64_t SurfacePatches::surfels_before(std::size_t patch) const {
-  // Round the weight; the first patch has one surfel at least.
-  const double rounded = std::round(weights_[patch]);
-  if (patch == 0) return 0;
-  return static_cast<std::uint64_t>(std::max(1.0, rounded));
-}
-
 std::uint64_t SurfacePatches::surfels() const noexcept {
-  return surfels_before(size());
+  return surfels_of(weights_.back());
 }
 
 SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfel) const {
@@ -333,14 +350,15 @@ SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfe
   Parts parts(mesh_);
   for (std::size_t i = begins_[patch]; i < begins_[patch + 1]; ++i) {
     const SubTriangle shape = shape_of(pieces_[i]);
-    parts.add(pieces_[i].triangle, shape, spacing_of(shape));
+    parts.add(pieces_[i].triangle, shape, spacing_of(shape, field_, mesh_.origin));
   }
   // Find the number of surfels: the rounded weight at its end less that at its beginning.
   SurfacePatch result;
   if (!(parts.weight() > 0)) return result;  // the weight is too little for a double
-  result.first = surfels_before(patch);
-  result.surfels = surfels_before(patch + 1) - result.first;
+  result.first = surfels_of(weights_[patch]);
+  result.surfels = surfels_of(weights_[patch + 1]) - result.first;
   result.area = parts.area();
+  if (result.surfels == 0) return result;
   result.points.resize(result.surfels * points_per_surfel);
   // Set the points along the sorted parts.
   parts.sort();

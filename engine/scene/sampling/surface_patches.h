@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -32,6 +34,29 @@ struct SurfacePatch {
   double area = 0;            ///< of the surface; both sides of double-sided materials count
 };
 
+/// Returns the finest spacing that any point of a part of a triangle asks for.
+/// @param origin  that of the mesh
+[[nodiscard]] double spacing_of(const SubTriangle& shape, const SpacingField& field,
+                                const glm::dvec3& origin);
+
+/// Cuts a triangle into pieces that are a few spacings wide.
+/// @param origin  that of the mesh
+/// @param take    gets each piece and its path, as SurfacePatches::Piece has it
+void cut_into_pieces(const SubTriangle& triangle, const SpacingField& field,
+                     const glm::dvec3& origin,
+                     const std::function<void(const SubTriangle&, std::uint32_t path)>& take);
+
+/// Returns the piece of a triangle to which a path leads.
+[[nodiscard]] SubTriangle piece_of(const SubTriangle& triangle, std::uint32_t path);
+
+/// Returns the place of a piece on the Z-curve through a box, a number of 63 bits. The box has 2^21
+/// cells along its widest side.
+/// @param offset  of the centre of the piece from the low corner of the box
+[[nodiscard]] std::uint64_t piece_place(const glm::dvec3& offset, double widest);
+
+/// Returns the number of surfels of all patches whose weights add up to this.
+[[nodiscard]] std::uint64_t surfels_of(double weight) noexcept;
+
 /// The surface of a mesh as a line along which wanted surfels are counted, cut into stretches.
 ///
 /// Triangles are halved until they are a few spacings wide, and these pieces are sorted along the
@@ -50,6 +75,25 @@ class SurfacePatches {
   /// @param surfels      wanted in one patch, roughly
   SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels);
 
+  /// A part of a triangle. Below its leading 1, the path has a bit for each halving, the first one
+  /// on top: 0b1 is the whole triangle, 0b110 the first half of the second half.
+  struct Piece {
+    std::uint32_t triangle;
+    std::uint32_t path;
+  };
+  /// Makes a single patch of pieces that cut_into_pieces() has made.
+  /// @param mesh, field  must outlive this
+  /// @param pieces       along the Z-curve
+  /// @param before       weight of all patches before this one
+  /// @param weight       of these pieces
+  SurfacePatches(const Mesh& mesh, const SpacingField& field, std::vector<Piece> pieces,
+                 double before, double weight)
+      : mesh_(mesh),
+        field_(field),
+        pieces_(std::move(pieces)),
+        begins_{0, pieces_.size()},
+        weights_{before, before + weight} {}
+
   /// Returns the number of patches.
   [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
   /// Returns the number of surfels of all patches together.
@@ -65,24 +109,12 @@ class SurfacePatches {
   [[nodiscard]] SurfacePatch spread(std::size_t patch, unsigned points_per_surfel) const;
 
  private:
-  /// A part of a triangle. Below its leading 1, the path has a bit for each halving, the first one
-  /// on top: 0b1 is the whole triangle, 0b110 the first half of the second half.
-  struct Piece {
-    std::uint32_t triangle;
-    std::uint32_t path;
-  };
-  /// Appends a part of a triangle as one piece, or cuts it further.
-  void cut(std::uint32_t triangle, const SubTriangle& shape, std::uint32_t path);
   /// Sorts the pieces along the Z-curve.
   void sort_along_curve();
   /// Joins successive pieces to patches of `surfels` surfels.
   void join(double surfels);
   /// Returns the shape of a piece, cut again from its triangle.
   [[nodiscard]] SubTriangle shape_of(const Piece& piece) const;
-  /// Returns the finest spacing that any point of a piece asks for.
-  [[nodiscard]] double spacing_of(const SubTriangle& shape) const;
-  /// Returns the number of surfels of all patches before one.
-  [[nodiscard]] std::uint64_t surfels_before(std::size_t patch) const;
   const Mesh& mesh_;
   const SpacingField& field_;
   std::vector<Piece> pieces_;

@@ -1,0 +1,202 @@
+// What each step gains against rays at the mesh is measured in spec/shading.md#from-a-mesh.
+#include "engine/scene/sampling/patch_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include "engine/base/numbers.h"
+#include "engine/scene/sampling/surroundings.h"
+
+namespace ptc {
+namespace {
+
+constexpr unsigned kRounds = 6;     // of Lloyd's method
+constexpr unsigned kLitPoints = 4;  // points of a surfel that light is traced from, evenly spread
+// Where both sides of a surface count, their surfels are kept apart: a back that lay at the place
+// of a front would hide it. Their radii differ, so that clusters of them have a mean normal.
+constexpr float kHalfGap = 0.02F;     // from the surface to each of them, radii
+constexpr float kDifference = 0.02F;  // of each one's area from their mean, over that
+constexpr double kMinNormal = 0.1;    // least length of a mean normal that is used
+
+// Returns the rays of one lit point, of those that a surfel has; rounded up.
+unsigned share(unsigned rays) {
+  return (rays + kLitPoints - 1) / kLitPoints;
+}
+
+glm::vec3 finite_or_black(const glm::vec3& c) {
+  return std::isfinite(c.x + c.y + c.z) ? c : glm::vec3(0);
+}
+
+// Returns the barycentric coordinates of the triangle's point that is nearest to p. The plane has
+// seven regions: three where a corner is nearest, three where an edge is, and the triangle itself.
+// Source: Ericson 2005, Real-time collision detection, section 5.1.5.
+glm::vec2 nearest_on_triangle(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b,
+                              const glm::dvec3& c) {
+  // Test the corners.
+  const glm::dvec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
+  if (d1 <= 0 && d2 <= 0) return {0, 0};
+  const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
+  if (d3 >= 0 && d4 <= d3) return {1, 0};
+  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
+  if (d6 >= 0 && d5 <= d6) return {0, 1};
+  // Test the edges.
+  const double across_c = d1 * d4 - d3 * d2;
+  if (across_c <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+  const double across_b = d5 * d2 - d1 * d6;
+  if (across_b <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+  const double across_a = d3 * d6 - d5 * d4;
+  if (across_a <= 0 && d4 >= d3 && d5 >= d6) {
+    const double v = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    return {1 - v, v};
+  }
+  // Take the foot of the perpendicular on the face.
+  const double sum = across_a + across_b + across_c;
+  return {across_b / sum, across_c / sum};
+}
+
+}  // namespace
+
+// Sums over the points of a group, which describe its surfel.
+struct PatchSampler::Group {
+  double area = 0;  // of one side, scene units squared
+  glm::dvec3 albedo{0};
+  glm::dvec3 emission{0};
+  glm::dvec3 normal{0};
+  std::vector<std::uint32_t> members;  // indices of the points, ascending: neighbours follow each
+                                       // other
+  std::uint32_t nearest = 0;           // index of the point that is nearest to the middle
+  float distance = std::numeric_limits<float>::infinity();  // of that point from the middle
+};
+
+double sides_of(const Mesh& mesh, std::uint32_t triangle) {
+  return mesh.materials[mesh.material_of[triangle]].double_sided ? 2 : 1;
+}
+
+PatchSampler::PatchSampler(const RayScene& scene, const DirectLight* light,
+                           const LightSampling& rays)
+    : scene_(scene),
+      light_(light),
+      lit_point_{share(rays.sun_rays), share(rays.area_rays), share(rays.sky_rays)} {}
+
+std::vector<PatchSampler::Group> PatchSampler::sum_up(const std::vector<SurfacePoint>& points,
+                                                      const std::vector<std::uint32_t>& owners,
+                                                      const std::vector<Cluster>& clusters) const {
+  std::vector<Group> groups(clusters.size());
+  for (std::uint32_t i = 0; i < points.size(); ++i) {
+    const SurfacePoint& p = points[i];
+    Group& group = groups[owners[i]];
+    const SurfaceHit surface = scene_.surface(p.triangle, p.uv.x, p.uv.y);
+    group.area += p.area;
+    group.members.push_back(i);
+    group.albedo += glm::dvec3(surface.albedo);
+    group.emission += glm::dvec3(surface.emission);
+    group.normal += glm::dvec3(surface.normal);
+    const float distance = glm::distance(p.position, clusters[owners[i]].position);
+    if (distance < group.distance) {
+      group.distance = distance;
+      group.nearest = i;
+    }
+  }
+  return groups;
+}
+
+// Places a surfel at the middle of its group, on the triangle of the point that is nearest to the
+// middle, across the group's mean normal, and moves it away from edges that it sticks out over.
+Surfel PatchSampler::place(const Group& group, const SurfacePoint& nearest,
+                           const Cluster& cluster) const {
+  // Find the place on the mesh that is nearest to the middle.
+  const Mesh& mesh = scene_.mesh();
+  const auto& c = mesh.triangles[nearest.triangle];
+  glm::vec2 uv =
+      nearest_on_triangle(glm::dvec3(cluster.position), glm::dvec3(mesh.positions[c[0]]),
+                          glm::dvec3(mesh.positions[c[1]]), glm::dvec3(mesh.positions[c[2]]));
+  if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = nearest.uv;
+  const SurfaceHit at = scene_.surface(nearest.triangle, uv.x, uv.y);
+  // Take the means of the group, and the normal there when the group's normals cancel out.
+  const auto count = static_cast<double>(group.members.size());
+  const double length = glm::length(group.normal);
+  Surfel surfel;
+  surfel.normal = length > kMinNormal * count ? glm::vec3(group.normal / length) : at.normal;
+  surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
+  surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
+  surfel.position =
+      at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
+  return surfel;
+}
+
+// Returns the mean radiance that a group reflects on one side, from those of a few of its points
+// that are not buried, or nothing when all of them are.
+// @param side  1 for the front, -1 for the back
+std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
+                                                 std::span<const SurfacePoint> points, float side,
+                                                 std::uint64_t seed) const {
+  if (light_ == nullptr) return glm::vec3(0);
+  const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
+  glm::vec3 sum(0);
+  float lit = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
+    const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
+    const std::uint64_t own_seed = kLitPoints * seed + i;
+    if (is_buried(scene_, at.position, side * at.geometric_normal, own_seed)) continue;
+    const DirectLight::Result direct =
+        light_->irradiance(at.position, side * at.normal, lit_point_, own_seed);
+    sum += finite_or_black(at.albedo / kPi * (direct.local + direct.sky));
+    lit += 1;
+  }
+  if (lit == 0) return {};
+  return sum / lit;
+}
+
+std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {
+  // Group the points.
+  std::vector<std::uint32_t> owners;
+  const std::vector<Cluster> clusters =
+      cluster_points(patch.points, patch.surfels, kRounds, owners);
+  const std::vector<Group> groups = sum_up(patch.points, owners, clusters);
+
+  // Light and place a surfel for each group that is not buried, two where both sides count.
+  std::vector<Surfel> surfels;
+  double covered = 0;  // sum of 2 r^2 of all surfels, buried ones as well
+  for (std::size_t i = 0; i < clusters.size(); ++i) {
+    const Group& group = groups[i];
+    const SurfacePoint& nearest = patch.points[group.nearest];
+    const double sides = sides_of(scene_.mesh(), nearest.triangle);
+    covered += group.area * sides;
+    const auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
+    const auto back =
+        sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
+    if (!front && !back) continue;
+    Surfel surfel = place(group, nearest, clusters[i]);
+    const bool both = front && back;
+    const glm::dvec3 middle = surfel.position;
+    const glm::dvec3 apart(both ? kHalfGap * surfel.radius * surfel.normal : glm::vec3(0));
+    const float radius = surfel.radius, difference = both ? kDifference : 0;
+    if (front) {
+      surfel.radius = radius * std::sqrt(1 + difference);
+      surfel.position = middle + apart;
+      surfel.emission =
+          finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+      surfel.radiance = *front;
+      surfels.push_back(surfel);
+    }
+    if (back) {
+      surfel.radius = radius * std::sqrt(1 - difference);
+      surfel.position = middle - apart;
+      surfel.normal = -surfel.normal;
+      surfel.emission = glm::vec3(0);
+      surfel.radiance = *back;
+      surfels.push_back(surfel);
+    }
+  }
+  // Scale the radii so that the surfels have the area of the patch.
+  const auto scale = static_cast<float>(std::sqrt(patch.area / covered));
+  for (Surfel& surfel : surfels) surfel.radius *= scale;
+  return surfels;
+}
+
+}  // namespace ptc

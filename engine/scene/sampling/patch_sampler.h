@@ -1,0 +1,69 @@
+// Turns a patch of surface into surfels.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/base/surfel.h"
+#include "engine/scene/light/direct_light.h"
+#include "engine/scene/light/lights.h"
+#include "engine/scene/ray_scene.h"
+#include "engine/scene/sampling/clusters.h"
+#include "engine/scene/sampling/surface_patches.h"
+
+namespace ptc {
+
+/// Returns how many sides of a triangle count: two where its material is double-sided.
+[[nodiscard]] double sides_of(const Mesh& mesh, std::uint32_t triangle);
+
+/// Groups the points of a patch, and makes a surfel of each group.
+///
+///     surface of a patch      16 points a surfel      groups of points       one surfel each
+///                             evenly spread           (Lloyd's method)
+///     +-----------+           +-----------+           +-----+-----+          +-----------+
+///     |\    |    /|           |. . . . . .|           |. . .|. . .|          |   _     _  |
+///     | \   |   / |   --->    | . . . . . |   --->    | . . | . . |   --->   |  ( )   ( ) |
+///     |  \  |  /  |           |. . . . . .|           |. . .|. . .|          |   -     -  |
+///     +-----------+           +-----------+           +-----+-----+          +-----------+
+///       triangles             surface_patches.h       clusters.h             place(), reflected()
+///
+/// The points measure a group: its area, mean normal, albedo and emission. The surfel lies at the
+/// middle of its group; the light is traced from 4 of the points, which share the surfel's rays.
+///
+/// Threads: sample() may be called concurrently.
+class PatchSampler {
+ public:
+  /// Points of a patch for each surfel.
+  static constexpr unsigned kPointsPerSurfel = 16;
+
+  /// @param scene  has the patch and all that lies around it; must outlive this
+  /// @param light  of that scene, must outlive this; null: surfels reflect nothing, and none counts
+  ///               as buried, because `scene` is a part of what could bury it
+  /// @param rays   shadow rays of each surfel
+  PatchSampler(const RayScene& scene, const DirectLight* light, const LightSampling& rays);
+
+  /// Returns the surfels of a patch. The sum of their 2 r^2 is the area of the patch less that of
+  /// groups that are buried.
+  /// @param patch  has kPointsPerSurfel points for each surfel
+  [[nodiscard]] std::vector<Surfel> sample(const SurfacePatch& patch) const;
+
+ private:
+  struct Group;
+  // Sums up the points of each cluster.
+  [[nodiscard]] std::vector<Group> sum_up(const std::vector<SurfacePoint>& points,
+                                          const std::vector<std::uint32_t>& owners,
+                                          const std::vector<Cluster>& clusters) const;
+  [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest,
+                             const Cluster& cluster) const;
+  [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group,
+                                                   std::span<const SurfacePoint> points, float side,
+                                                   std::uint64_t seed) const;
+
+  const RayScene& scene_;
+  const DirectLight* light_;
+  LightSampling lit_point_;  // shadow rays for each lit point of a surfel
+};
+
+}  // namespace ptc

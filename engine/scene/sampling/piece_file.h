@@ -1,0 +1,95 @@
+// A surface that does not fit in memory, cut into pieces that are sorted along the Z-curve on the
+// disk.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "engine/base/executor.h"
+#include "engine/io/file/file.h"
+#include "engine/scene/sampling/mesh_parts.h"
+#include "engine/scene/sampling/spacing_field.h"
+#include "engine/scene/sampling/surface_patches.h"
+
+namespace ptc {
+
+/// What the sort of a surface may use.
+struct PieceSortOptions {
+  static constexpr std::uint64_t kLeastBytes = std::uint64_t{16} << 20;
+  std::uint64_t memory_bytes = std::uint64_t{64} << 20;  ///< cap of the sort, at least kLeastBytes
+  std::vector<std::filesystem::path> temp_dirs{"."};     ///< at least one
+};
+
+/// The pieces of meshes in a temporary file, and the patches that they make up.
+///
+///     triangles    -> cut_into_pieces() -> sorts by place on the curve -> one file of rows
+///     rows         | path, material | positions | uvs | normals |
+///     patches      |----------------|--------------|--          pieces that follow one another
+///     blocks       |---|---|---|---|---|---|---|---|---|        kBlockPieces each, with a box
+///
+/// The boxes of the blocks tell which pieces lie near a patch: a surfel looks for the ends of the
+/// surface around it, also beyond its patch.
+///
+/// Memory: index_bytes().   Threads: const members may be called concurrently.
+class PieceFile {
+ public:
+  /// Cuts and sorts the surface. The result does not depend on `options`.
+  /// @param parts, field  must outlive this
+  /// @param surfels       wanted in one patch, at most
+  /// @throws std::system_error
+  PieceFile(const MeshParts& parts, const SurfaceSurvey& found, const SpacingField& field,
+            double surfels, const PieceSortOptions& options, const Executor& executor);
+
+  /// Returns the number of patches.
+  [[nodiscard]] std::size_t size() const noexcept { return begins_.size() - 1; }
+
+  /// A patch and the surface around it.
+  struct Patch {
+    Mesh mesh;                                  ///< triangles of the patch, and of what is near it
+    std::vector<SurfacePatches::Piece> pieces;  ///< of the patch alone, along the curve
+    double before = 0;                          ///< weight of all patches before it
+    double weight = 0;                          ///< of its pieces
+  };
+  /// Reads a patch. @throws std::system_error
+  [[nodiscard]] Patch load(std::size_t patch) const;
+
+  /// Returns the memory of an open file of pieces, bytes.
+  [[nodiscard]] static std::uint64_t index_bytes(std::uint64_t triangles, std::uint64_t surfels,
+                                                 double patch_surfels) noexcept;
+  /// The most memory of a patch and of a ray scene over its mesh, bytes.
+  static constexpr std::uint64_t kPatchBytes = std::uint64_t{16} << 20;
+
+ private:
+  struct Row;
+  class Writer;
+  /// A box in floats, relative to the origin of the parts.
+  struct Box {
+    glm::vec3 low, high;
+  };
+  class LocalMesh;
+
+  [[nodiscard]] std::size_t groups() const noexcept;
+  void sort(const SurfaceSurvey& found, const PieceSortOptions& options, const Executor& executor);
+  void read_rows(std::uint64_t first, std::span<Row> rows) const;
+  void pack(const Row& row, std::byte* to) const noexcept;
+  void unpack(const std::byte* from, Row& row) const noexcept;
+  [[nodiscard]] static Box box_of(const Row& row);
+
+  const MeshParts& parts_;
+  const SpacingField& field_;
+  double patch_surfels_;
+  std::size_t row_bytes_;
+  std::vector<std::filesystem::path> temp_dirs_;
+  TempFile file_;
+  std::vector<std::uint64_t> begins_{0};  ///< first piece of each patch, then the end
+  std::vector<double> weights_{0};        ///< weight of all patches before each, then the total
+  std::vector<float> spacings_;           ///< the greatest in each patch
+  std::vector<Box> blocks_;
+};
+
+}  // namespace ptc
