@@ -100,10 +100,10 @@ TEST_CASE("streamed sampler: surfels are as many, as large and as even as in mem
           Approx(static_cast<double>(options.count)).epsilon(0.02));
     CHECK(covered_area(streamed) == Approx(one_sided_area(shape.mesh)).epsilon(1e-5));
     CHECK(mean_radius(streamed) == Approx(mean_radius(usual)).epsilon(0.03));
-    CHECK(a.nearest_mean == Approx(b.nearest_mean).epsilon(0.03));
-    CHECK(a.nearest_deviation < 1.1 * b.nearest_deviation);
+    CHECK(a.nearest_mean == Approx(b.nearest_mean).epsilon(0.01));
+    CHECK(a.nearest_deviation < 1.05 * b.nearest_deviation);
     CHECK(a.largest_hole < 1.1);
-    CHECK(a.uncovered < std::max(0.008, 1.2 * b.uncovered));
+    CHECK(a.uncovered < 1.3 * b.uncovered);  // 2.3 times as much on the sphere without the halo
   }
 }
 
