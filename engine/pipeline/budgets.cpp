@@ -7,6 +7,7 @@
 #include "engine/base/error.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/scene/sampling/mesh_parts.h"
+#include "engine/store/commit.h"
 #include "engine/trace/disc_tracer.h"
 
 namespace ptc {
@@ -38,6 +39,17 @@ ThreadsThatFit threads_that_fit(const RunOptions& run,
       if (threads == 1) throw;
     }
   }
+}
+
+const std::filesystem::path& with_directory_under(const std::filesystem::path& scene,
+                                                  const RunOptions& run) {
+  const InputFile file(scene);
+  const Superblock superblock = read_superblock(file, read_file_header(file));
+  MemoryBudget budget(run.memory_bytes, "this scene");
+  budget.charge("the directory of " + scene.filename().string(),
+                ContainerReader::kMaxPageBytes * superblock.page_count);
+  budget.require();
+  return scene;
 }
 
 void charge_directory(MemoryBudget& budget, const ContainerReader& container) {

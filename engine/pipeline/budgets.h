@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 
 #include "engine/base/memory_budget.h"
@@ -38,6 +39,12 @@ struct ThreadsThatFit {
 /// @throws LimitError when not even one thread fits; it is that of one thread
 [[nodiscard]] ThreadsThatFit threads_that_fit(
     const RunOptions& run, const std::function<std::uint64_t(unsigned threads)>& left);
+
+/// Checks that the directory of a container can be read under the cap of a run, before it is.
+/// @return `scene`
+/// @throws LimitError; FormatError, std::system_error as ContainerReader does
+[[nodiscard]] const std::filesystem::path& with_directory_under(const std::filesystem::path& scene,
+                                                                const RunOptions& run);
 
 /// Charges the directory that an open container keeps in memory.
 void charge_directory(MemoryBudget& budget, const ContainerReader& container);

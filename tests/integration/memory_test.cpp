@@ -128,6 +128,10 @@ TEST_CASE("memory: the cap for shading covers the directory of every open contai
       shade_container(request, dir / "o.ply", silent);
     });
   };
+  // What is too small for the directory is refused before that is read
+  ShadeRequest small{{.scene = dir / "many.ptcx", .run = {.memory_bytes = 100 * many}}};
+  CHECK_THROWS_WITH(shade_container(small, dir / "o.ply", silent),
+                    Catch::Contains("this scene") && Catch::Contains("directory of many.ptcx"));
   const std::uint64_t least = shading("few.ptcx", "");
   CHECK(shading("many.ptcx", "") == least + 40 * (many - few));
   CHECK(shading("few.ptcx", "few.ptcx") == least + 40 * few);

@@ -164,7 +164,7 @@ class Build {
                          "`append` excludes `city_points`: the points to append are read from "
                          "files");
     }
-    scene_ = std::make_unique<ContainerReader>(request_.append);
+    scene_ = std::make_unique<ContainerReader>(with_directory_under(request_.append, request_.run));
     check_extensible(*scene_);
     // Keep the lights of the scene; without meshes to light, their sky picture is not loaded
     if (scene_->meta().text.contains(kLightsKey)) {

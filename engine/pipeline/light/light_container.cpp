@@ -213,7 +213,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
                          Progress& progress) {
   // Open the scene, and choose the lights
   LightReport report;
-  const ContainerReader scene(request.scene);
+  const ContainerReader scene(with_directory_under(request.scene, request.run));
   const LightRig rig =
       normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
   const Meta planned = lit_meta(scene, rig, true);

@@ -133,7 +133,7 @@ Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progr
       report_(report),
       progress_(progress),
       executor_(request.run.threads),
-      scene_(request.scene) {
+      scene_(with_directory_under(request.scene, request.run)) {
   if (request.tolerate_damage) lost_ = std::make_unique<LostPages>(scene_);
   report_.bounces = request.bounces;
 }

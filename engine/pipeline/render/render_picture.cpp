@@ -401,7 +401,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
 /// Renders the light of each group of lights apart, into layers whose sum is the beauty.
 LightingReport render_groups(const RenderRequest& request, std::span<const PictureTarget> targets,
                              Progress& progress) {
-  const ContainerReader scene(request.scene);
+  const ContainerReader scene(with_directory_under(request.scene, request.run));
   const LightRig rig = request.lights ? *request.lights : recorded_lights(scene, progress);
   check_names(request, targets, rig.sky.map_path);
   Progress silent;

@@ -186,7 +186,8 @@ struct OpenReceivers {
                                                Progress& progress, std::string& las_records) {
     if (request.receivers.empty()) return nullptr;
     if (is_container(request.receivers)) {
-      return std::make_unique<ContainerReader>(request.receivers);
+      return std::make_unique<ContainerReader>(
+          with_directory_under(request.receivers, request.run));
     }
     const BuildRequest build{.inputs = {request.receivers},
                              .lights = LightRig{},  // receivers need no light of their own
@@ -371,10 +372,11 @@ LightingReport shade_in_input_order(const ShadeRequest& request,
                                     const std::string& las_records, Progress& progress) {
   if (!request.colour_from.empty()) {
     PointWriteInfo info =
-        shaded_points(ContainerReader(request.scene), 0, "", request.colour_from, std::nullopt);
+        shaded_points(ContainerReader(with_directory_under(request.scene, request.run)), 0, "",
+                      request.colour_from, std::nullopt);
     ShadedExtras extras = extras_of(request);
     if (request.light_groups) {
-      const ContainerReader scene(request.scene);
+      const ContainerReader scene(with_directory_under(request.scene, request.run));
       extras.groups = groups_of(request, recorded_rig(scene), may_emit(scene));
     }
     const std::vector<Channel> added = shading_channels(extras);
