@@ -1,7 +1,6 @@
 #include "engine/pipeline/budgets.h"
 
 #include <algorithm>
-#include <set>
 #include <utility>
 
 #include "engine/base/error.h"
@@ -60,14 +59,8 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
 
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
   budget.charge("the mesh", bytes_of(mesh));
-  std::set<const Image*> textures{nullptr};
-  std::uint64_t pixels = 0;
-  for (const Material& material : mesh.materials) {
-    for (const Image* texture : {material.texture.get(), material.emission_texture.get()}) {
-      if (textures.insert(texture).second) pixels += texture->pixels.size();
-    }
-  }
-  if (pixels > 0) budget.charge("textures", pixels * sizeof(glm::vec3));
+  if (const std::uint64_t bytes = texture_bytes(mesh.materials); bytes > 0)
+    budget.charge("textures", bytes);
   if (rays) budget.charge("rays at the mesh", rays->bytes());
 }
 

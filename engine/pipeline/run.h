@@ -15,7 +15,7 @@ namespace ptc {
 /// The resources of a run. They decide how long it takes, not what it gives: the output is the
 /// same, byte for byte, for every cap, number of threads and choice of directories. There is one
 /// exception: meshes that do not fit under the cap are sampled from the disk in smaller patches,
-/// and lit by rays at the surfels (spec/shading.md#streamed-meshes).
+/// lit by rays at the surfels (spec/shading.md#streamed-meshes), and seen by a camera as surfels.
 struct RunOptions {
   /// Maximum of resident bytes, caches included. A run that cannot keep to it throws LimitError,
   /// whose text names the least cap that works.

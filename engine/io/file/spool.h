@@ -58,9 +58,14 @@ class Spool {
   /// Moves the items to a temporary file. @throws std::system_error that names the directory
   void spill(const std::filesystem::path& directory) {
     file_ = std::make_unique<TempFile>(directory);
+    end();
+  }
+  /// Writes what is in memory to the file, if there is one, so that a list which no longer changes
+  /// takes none. @throws std::system_error
+  void end() {
+    if (!file_) return;
     flush();
     recent_ = std::vector<T>();
-    recent_.reserve(kFlushItems);
   }
 
  private:

@@ -128,6 +128,56 @@ double load(const std::byte* from, std::uint64_t type) {
                    std::to_string((bytes >> 20) + 1) + " MiB or more");
 }
 
+// Measures the memory that parsed JSON takes, without keeping it.
+class JsonMeter : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
+  [[nodiscard]] bool too_deep() const noexcept { return too_deep_; }
+
+  bool null() override { return value(0); }
+  bool boolean(bool /*value*/) override { return value(0); }
+  bool number_integer(number_integer_t /*value*/) override { return value(0); }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return value(0); }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override {
+    return value(0);
+  }
+  bool string(string_t& text) override { return value(text.size()); }
+  bool binary(binary_t& /*value*/) override { return value(0); }
+  bool key(string_t& text) override {
+    bytes_ += text.size();
+    return true;
+  }
+  bool start_object(std::size_t /*elements*/) override { return open(); }
+  bool end_object() override { return close(); }
+  bool start_array(std::size_t /*elements*/) override { return open(); }
+  bool end_array() override { return close(); }
+  // The parser that keeps the values reports what is no JSON
+  bool parse_error(std::size_t /*at*/, const std::string& /*token*/,
+                   const nlohmann::detail::exception& /*error*/) override {
+    return false;
+  }
+
+ private:
+  bool value(std::size_t string_bytes) {
+    constexpr std::uint64_t kValueBytes = 96;  // of a member of an object, its key included
+    constexpr std::uint64_t kCopies = 3;       // of a string, while it is read and kept
+    bytes_ += kValueBytes + kCopies * string_bytes;
+    return true;
+  }
+  bool open() {
+    too_deep_ |= ++depth_ > kMaxDepth;
+    return value(0) && !too_deep_;
+  }
+  bool close() {
+    --depth_;
+    return true;
+  }
+
+  std::uint64_t bytes_ = 0;
+  int depth_ = 0;
+  bool too_deep_ = false;
+};
+
 // Returns the numbers in an element of a type, or 0 for matrices and unknown types.
 std::size_t components_of(const std::string& type) {
   if (type == "SCALAR") return 1;
@@ -165,20 +215,15 @@ std::vector<std::byte> GltfDocument::read_text(std::uint64_t offset, std::uint64
 }
 
 void GltfDocument::parse(const std::vector<std::byte>& text, std::uint64_t memory_bytes) {
-  // Count values while they are read, so that nested arrays do not fill the memory first
-  constexpr std::uint64_t kValueBytes = 96;  // of a member of an object, its key included
-  std::uint64_t bytes = text.size();
-  const auto watch = [&](int depth, Json::parse_event_t event, Json& /*parsed*/) {
-    if (depth > kMaxDepth) fail("its JSON is nested more than 128 deep");
-    if (event == Json::parse_event_t::object_end || event == Json::parse_event_t::array_end)
-      return true;
-    bytes += kValueBytes;
-    if (bytes > memory_bytes) refuse_room(path_, bytes);
-    return true;
-  };
+  // Measure the values before they are kept, so that nested arrays do not fill the memory first
   const auto* begin = reinterpret_cast<const char*>(text.data());
+  JsonMeter meter;
   try {
-    root_ = Json::parse(begin, begin + text.size(), watch);
+    Json::sax_parse(begin, begin + text.size(), &meter);
+    if (meter.too_deep()) fail("its JSON is nested more than 128 deep");
+    json_bytes_ = meter.bytes();
+    if (text.size() + json_bytes_ > memory_bytes) refuse_room(path_, text.size() + json_bytes_);
+    root_ = Json::parse(begin, begin + text.size());
   } catch (const Json::exception& error) {
     fail(error.what());
   }

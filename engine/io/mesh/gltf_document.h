@@ -89,6 +89,8 @@ class GltfDocument {
   /// @throws DataError, std::system_error when the file does not give the bytes
   void read(const Elements& elements,
             const std::function<void(std::span<const double>)>& take) const;
+  /// Returns the memory of the JSON, bytes.
+  [[nodiscard]] std::uint64_t json_bytes() const noexcept { return json_bytes_; }
   /// Returns the size of the file and of the buffers that were used so far, bytes.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
@@ -123,6 +125,7 @@ class GltfDocument {
   std::vector<std::optional<Buffer>> buffers_;  // found when first needed
   std::map<std::string, InputFile> files_;      // of buffers, by name
   std::uint64_t bytes_read_ = 0;
+  std::uint64_t json_bytes_ = 0;
 };
 
 template <std::size_t N>

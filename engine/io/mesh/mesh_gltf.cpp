@@ -82,7 +82,8 @@ class GltfMesh {
  public:
   GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
       : document_(path, room.memory_bytes),
-        soup_(path, room),
+        soup_(path, {room.memory_bytes - std::min(room.memory_bytes, document_.json_bytes()),
+                     room.temp_directory}),
         textures_(path.parent_path(), warnings_) {}
 
   MeshFile read() {

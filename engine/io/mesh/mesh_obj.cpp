@@ -63,10 +63,10 @@ class ObjMesh {
       soup_.add_position({p[0], p[1], p[2]});
     } else if (keyword == "vn") {
       const auto n = read_numbers<3>(words, 3);
-      soup_.normals.push_back({n[0], n[1], n[2]});
+      soup_.add_normal({n[0], n[1], n[2]});
     } else if (keyword == "vt") {
       const auto t = read_numbers<2>(words, 1);
-      soup_.uvs.push_back({t[0], t[1]});
+      soup_.add_uv({t[0], t[1]});
     } else if (keyword == "f") {
       read_face(words);
     } else if (keyword == "usemtl") {

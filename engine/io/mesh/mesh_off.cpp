@@ -96,8 +96,8 @@ class OffMesh {
     const std::size_t least = 3U + (has_normals_ ? 3U : 0U) + (has_uvs_ ? 2U : 0U);
     if (n < least) stream_.fail_at_line("the vertex has too few values");
     soup_.add_position({values[0], values[1], values[2]});
-    if (has_normals_) soup_.normals.push_back({values[3], values[4], values[5]});
-    if (has_uvs_) soup_.uvs.push_back({values[n - 2], values[n - 1]});
+    if (has_normals_) soup_.add_normal({values[3], values[4], values[5]});
+    if (has_uvs_) soup_.add_uv({values[n - 2], values[n - 1]});
   }
 
   void read_face() {

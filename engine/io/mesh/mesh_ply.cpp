@@ -62,9 +62,9 @@ class PlyMesh {
       soup_.add_position({value(p[0]), value(p[1]), value(p[2])});
       if (normal_) {
         const auto& n = *normal_;
-        soup_.normals.push_back({value(n[0]), value(n[1]), value(n[2])});
+        soup_.add_normal({value(n[0]), value(n[1]), value(n[2])});
       }
-      if (uv_) soup_.uvs.push_back({value((*uv_)[0]), value((*uv_)[1])});
+      if (uv_) soup_.add_uv({value((*uv_)[0]), value((*uv_)[1])});
     }
   }
 

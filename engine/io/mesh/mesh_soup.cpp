@@ -212,6 +212,7 @@ std::size_t MeshSoup::add_material(Material material) {
 
 void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material) {
   corners.append(polygon);
+  triangles_ += std::max<std::size_t>(polygon.size(), 2) - 2;
   polygons.push_back(
       {static_cast<std::uint32_t>(polygon.size()), static_cast<std::uint16_t>(material)});
   if (polygons.size() % kItemsBetweenChecks == 0) check_room();
@@ -224,18 +225,28 @@ void MeshSoup::drop_uvs() {
 
 std::uint64_t MeshSoup::peak_bytes() const noexcept {
   // Of each list itself, and of what build_mesh() makes of it before it is freed
-  return 36 * corners.size() + 24 * polygons.size() + 52 * positions.size() + 40 * normals.size() +
-         24 * uvs.size();
+  return 12 * corners.size() + 94 * triangles_ + 8 * polygons.size() + 56 * positions.size() +
+         40 * normals.size() + 24 * uvs.size();
 }
 
 void MeshSoup::check_room() {
-  constexpr std::uint64_t kMaxCorners = std::uint64_t{1} << 28;  // of what build_mesh() can number
-  if (spilled() || (peak_bytes() <= room_.memory_bytes && corners.size() <= kMaxCorners)) return;
+  constexpr std::uint64_t kMaxTriangles = 0xffffffffU / 3;  // whose corners build_mesh() can number
+  if (spilled() || (peak_bytes() <= room_.memory_bytes && triangles_ <= kMaxTriangles)) return;
   positions.spill(room_.temp_directory);
   normals.spill(room_.temp_directory);
   uvs.spill(room_.temp_directory);
   corners.spill(room_.temp_directory);
   polygons.spill(room_.temp_directory);
+}
+
+void MeshSoup::settle() {
+  check_room();
+  if (!spilled()) return;
+  positions.end();
+  normals.end();
+  uvs.end();
+  corners.end();
+  polygons.end();
 }
 
 Mesh build_mesh(MeshSoup soup) {

@@ -32,7 +32,7 @@
 namespace ptc {
 
 /// Polygons over positions, normals and texture coordinates, each with indices of its own. Readers
-/// may add a polygon before its vertices, because only build_mesh() checks the indices. What does
+/// may add a polygon before its vertices, because indices are checked when all are there. What does
 /// not fit in the memory that a MeshRoom allows is on the disk.
 class MeshSoup {
  public:
@@ -71,6 +71,16 @@ class MeshSoup {
     positions.push_back(position);
     if (positions.size() % kItemsBetweenChecks == 0) check_room();
   }
+  /// Adds a normal, of any length. @throws as add_position()
+  void add_normal(const glm::vec3& normal) {
+    normals.push_back(normal);
+    if (normals.size() % kItemsBetweenChecks == 0) check_room();
+  }
+  /// Adds texture coordinates. @throws as add_position()
+  void add_uv(const glm::vec2& uv) {
+    uvs.push_back(uv);
+    if (uvs.size() % kItemsBetweenChecks == 0) check_room();
+  }
   /// Adds a material and returns its index.
   /// @throws DataError when there are 65,536 materials already
   std::size_t add_material(Material material);
@@ -86,7 +96,7 @@ class MeshSoup {
     return corner;
   }
   /// Ends the lists: leaves them in memory or on the disk, as MeshRoom describes.
-  void settle() { check_room(); }
+  void settle();
   /// Returns the memory that build_mesh() takes at its peak, bytes.
   [[nodiscard]] std::uint64_t peak_bytes() const noexcept;
 
@@ -97,6 +107,7 @@ class MeshSoup {
   std::filesystem::path path_;
   MeshRoom room_;
   bool uvs_dropped_ = false;
+  std::uint64_t triangles_ = 0;  ///< that the polygons become, at most
 };
 
 /// Builds the mesh of a soup: triangles over shared vertices, relative to an origin.

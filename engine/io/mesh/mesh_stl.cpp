@@ -5,6 +5,7 @@
 #include <cstring>
 #include <utility>
 
+#include "engine/base/error.h"
 #include "engine/io/mesh/mesh_soup.h"
 #include "engine/io/text/byte_stream.h"
 #include "engine/io/text/text.h"
@@ -82,6 +83,8 @@ class StlMesh {
   }
 
   void add_corner(const glm::dvec3& position) {
+    if (soup_.positions.size() >= MeshSoup::kNone)
+      throw DataError(path_.string() + ": the file has more than 2^32 / 3 triangles");
     corners_.push_back(
         {static_cast<std::uint32_t>(soup_.positions.size()), MeshSoup::kNone, MeshSoup::kNone});
     soup_.add_position(position);

@@ -210,11 +210,12 @@ class Build {
   [[nodiscard]] MeshLimits mesh_limits() const {
     const MemoryBudget budget = build_budget();
     const std::uint64_t sampling = sampling_bytes(0, request_.sampling.count, 1);
-    // A mesh takes a quarter or less of what reading it takes, and leaves room for streaming. One
-    // that takes less than streaming does is better in memory
+    // Meshes that are kept leave room for streaming. One that takes less than streaming does is
+    // better in memory
     constexpr std::uint64_t kLeast = StreamingRoom::kLeastBytes;
     const std::uint64_t room = std::max(sampling_room(budget, 0), 2 * kLeast) - kLeast;
-    return {.reading = std::min(std::max(budget.left(), kLeast), 4 * room),
+    return {.reading = std::max(budget.left(), kLeast),
+            .kept = room,
             .traced = std::max(sampling_room(budget, sampling), kLeast),
             .temp_directory = roomiest_temp_dir(request_.run, target_)};
   }
@@ -224,7 +225,7 @@ class Build {
   [[nodiscard]] std::uint64_t sampling_room(const MemoryBudget& budget, std::uint64_t fixed) const {
     const std::uint64_t others =
         fixed + kMinSortBytes + held_pages_bytes(request_.page_shift) +
-        ContainerWriter::writing_bytes(request_.page_shift, executor_.threads());
+        ContainerWriter::writing_bytes(request_.page_shift, 1);  // no number of threads decides
     return budget.left() > others ? budget.left() - others : 0;
   }
 
@@ -293,6 +294,11 @@ class Build {
       progress_.note(
           "the meshes do not fit in memory: they are sampled from the disk, and lit by rays at the "
           "surfels");
+      if (inputs.clouds.points > 0 || scene_points() > 0) {
+        progress_.note(
+            "all other points are lit anew together with them, also those that have light "
+            "of their own");
+      }
     }
     if (inputs.relight) light_later(inputs);
     Meta meta = make_meta(request_, inputs);
@@ -319,7 +325,10 @@ class Build {
     }
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
       budget.charge("the meshes", streamed->parts.bytes());
-      const std::uint64_t fixed = streaming_bytes(streamed->found, request_.sampling);
+      if (const std::uint64_t bytes = texture_bytes(streamed->parts.materials()); bytes > 0)
+        budget.charge("textures", bytes);
+      const std::uint64_t fixed =
+          streaming_bytes(streamed->found, with_spacing(request_.sampling, streamed->found.area));
       room.streaming.memory_bytes =
           std::clamp(sampling_room(budget, fixed) / 2, StreamingRoom::kLeastBytes,
                      std::max(8U, executor_.threads()) * StreamingRoom::kLeastBytes);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <utility>
 
 #include "engine/base/surfel.h"
@@ -51,64 +52,75 @@ void add_backdrop(Mesh& mesh, const Bounds& bounds, const char* field) {
           {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)}, field);
 }
 
-/// Joins meshes: in memory as long as they fit, else as parts.
+/// Collects meshes, and joins them when it is known that all fit.
 class Joiner {
  public:
   Joiner(const MeshLimits& limits, const char* field) : limits_(limits), field_(field) {}
 
-  /// Returns the room that is left for another mesh.
+  /// Returns the room that is left for another mesh. What reading takes at its peak is four times
+  /// the mesh, or more.
   [[nodiscard]] MeshRoom room() const {
-    const std::uint64_t held = parts_ ? parts_->bytes() : bytes_of(mesh_);
-    return {limits_.reading > held ? limits_.reading - held : 0, limits_.temp_directory};
+    const auto left = [&](std::uint64_t cap) { return cap > held_ ? cap - held_ : 0; };
+    constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+    const std::uint64_t kept = left(limits_.kept);
+    return {std::min(left(limits_.reading), kept > kMost / 4 ? kMost : 4 * kept),
+            limits_.temp_directory};
   }
 
-  // The first mesh is taken over, so that a single one is never copied
-  template <class M>
-  void add(M&& mesh) {
-    if (parts_) {
-      parts_->add(std::forward<M>(mesh));
-    } else if (mesh_.triangles.empty()) {
-      mesh_ = std::forward<M>(mesh);
-    } else {
-      append_mesh(mesh_, mesh, glm::dmat4(1), field_);
-      joined_ = true;
-    }
+  void add(Mesh mesh) {
+    held_ += bytes_of(mesh);
+    traced_ += traced_bytes(mesh);
+    meshes_.push_back({std::move(mesh), nullptr});
   }
   void add(std::shared_ptr<const SpilledMesh> mesh) {
-    divide();
-    parts_->add(std::move(mesh));
+    spilled_ = true;
+    meshes_.push_back({{}, std::move(mesh)});
   }
 
   [[nodiscard]] LoadedMeshes take(bool backdrop) {
-    if (joined_) check_mesh(mesh_, field_);  // meshes may lie too far from each other
-    if (traced_bytes() > limits_.traced) divide();
-    if (backdrop && parts_) {
+    LoadedMeshes loaded;
+    if (spilled_ || traced_ > limits_.traced) {
+      loaded.parts = std::make_unique<MeshParts>();
+      for (auto& [mesh, spilled] : meshes_) {
+        if (spilled) {
+          loaded.parts->add(std::move(spilled));
+        } else {
+          loaded.parts->add(std::move(mesh));
+        }
+      }
+      if (!backdrop) return loaded;
       Mesh boxes;
-      add_backdrop(boxes, parts_->bounds(), field_);
-      parts_->add(std::move(boxes));
-    } else if (backdrop && !mesh_.triangles.empty()) {
-      add_backdrop(mesh_, mesh_.bounds(), field_);
+      add_backdrop(boxes, loaded.parts->bounds(), field_);
+      loaded.parts->add(std::move(boxes));
+      return loaded;
     }
-    return {std::move(mesh_), std::move(parts_)};
+    // The first mesh is taken over, so that a single one is never copied
+    for (auto& [mesh, spilled] : meshes_) {
+      if (loaded.mesh.triangles.empty()) {
+        loaded.mesh = std::move(mesh);
+      } else {
+        append_mesh(loaded.mesh, std::exchange(mesh, {}), glm::dmat4(1), field_);
+      }
+    }
+    if (meshes_.size() > 1) check_mesh(loaded.mesh, field_);  // they may lie too far apart
+    if (backdrop && !loaded.mesh.triangles.empty())
+      add_backdrop(loaded.mesh, loaded.mesh.bounds(), field_);
+    return loaded;
   }
 
  private:
-  /// Returns the memory of the mesh with what rays at it and its sampling take.
-  [[nodiscard]] std::uint64_t traced_bytes() const {
+  /// Returns the memory of a mesh with what rays at it and its sampling take.
+  [[nodiscard]] static std::uint64_t traced_bytes(const Mesh& mesh) {
     constexpr std::uint64_t kRayBytes = 90, kSamplingBytes = 24;  // for each triangle
-    return bytes_of(mesh_) + mesh_.triangles.size() * (kRayBytes + kSamplingBytes);
-  }
-  void divide() {
-    if (parts_) return;
-    parts_ = std::make_unique<MeshParts>();
-    parts_->add(std::exchange(mesh_, {}));
+    return bytes_of(mesh) + texture_bytes(mesh.materials) +
+           mesh.triangles.size() * (kRayBytes + kSamplingBytes);
   }
 
   MeshLimits limits_;
   const char* field_;
-  Mesh mesh_;
-  std::unique_ptr<MeshParts> parts_;
-  bool joined_ = false;
+  std::vector<std::pair<Mesh, std::shared_ptr<const SpilledMesh>>> meshes_;
+  bool spilled_ = false;
+  std::uint64_t held_ = 0, traced_ = 0;  ///< bytes
 };
 
 }  // namespace
@@ -135,7 +147,7 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   // Add the mesh in memory and the backdrop
   if (also) {
     check_mesh(*also);
-    joiner.add(*also);
+    joiner.add(Mesh(*also));
   }
   return joiner.take(backdrop);
 }

@@ -17,6 +17,8 @@ namespace ptc {
 struct MeshLimits {
   /// Cap while meshes are read, bytes.
   std::uint64_t reading = std::numeric_limits<std::uint64_t>::max();
+  /// Cap of meshes that stay in memory although all of them do not fit, bytes.
+  std::uint64_t kept = std::numeric_limits<std::uint64_t>::max();
   /// Cap of the meshes and of what rays at them and their sampling need, bytes.
   std::uint64_t traced = std::numeric_limits<std::uint64_t>::max();
   std::filesystem::path temp_directory = ".";

@@ -46,7 +46,7 @@ unsigned even_bits(unsigned number) {
 ///     ' +-------------+   '
 ///       |  seen_      |       seen_ grows to the right as far as the depth buffer allows
 ///     ' |             |   '
-///       +-------------+       area_ is traced
+///       +-------------+       area_ is traced; a picture's full width grows downwards
 ///     +- - - - - - - - - -+
 class CloudView : public SplatView {
  public:
@@ -72,10 +72,10 @@ class CloudView : public SplatView {
     seen_ = whole();
   }
 
-  void look_at(const SampleRect& rect) override {
+  void look_at(const SampleRect& rect, bool on) override {
     if (seen_.contains(rect)) return;
     Progress silent;
-    seen_ = widened(rect);
+    seen_ = on ? widened(rect) : rect;
     trace(around(seen_), silent);
     finish(executor_);
   }
@@ -119,7 +119,8 @@ class CloudView : public SplatView {
             std::min(height_, rect.y1 + kHoleReach)};
   }
 
-  /// Lets a rectangle grow to the right as far as the depth buffer allows.
+  /// Lets a rectangle grow to the right as far as the depth buffer allows and, if it is as wide as
+  /// the picture then, downwards.
   [[nodiscard]] SampleRect widened(SampleRect rect) const {
     const SampleRect traced = around(rect);
     const std::uint64_t columns = options_.depth_bytes / kSplatBytes / (traced.y1 - traced.y0);
@@ -128,6 +129,13 @@ class CloudView : public SplatView {
       rect.x1 =
           right >= width_ ? width_ : std::max(rect.x1, static_cast<unsigned>(right) - kHoleReach);
     }
+    if (rect.x0 > 0 || rect.x1 < width_) return rect;
+    const std::uint64_t rows = options_.depth_bytes / kSplatBytes / width_;
+    const std::uint64_t below = traced.y0 + rows;
+    rect.y1 = below >= height_
+                  ? height_
+                  : std::max(rect.y1, static_cast<unsigned>(below) -
+                                          std::min(static_cast<unsigned>(below), kHoleReach));
     return rect;
   }
 

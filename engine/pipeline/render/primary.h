@@ -58,7 +58,8 @@ class PrimaryView {
   virtual ~PrimaryView() = default;
   /// Finds what the samples of a rectangle see, where the view does not hold all of the picture.
   /// What at() returns does not depend on the rectangles.
-  virtual void look_at(const SampleRect& /*rect*/) {}
+  /// @param on  whether the rectangles behind it in its row, and then those below, come next
+  virtual void look_at(const SampleRect& /*rect*/, bool /*on*/ = true) {}
   /// Returns the nearest surface behind a sample; nothing where the camera sees the sky.
   /// @param x, y  place on the grid of samples, width * side by height * side, (0, 0) top left;
   ///              in the rectangle of the last look_at(), if the view does not hold all
@@ -79,7 +80,7 @@ class PrimaryView {
 struct SurfelViewOptions {
   unsigned side = 1;  ///< samples along the side of a pixel
   float lift = 0;     ///< height of receivers above their surfel, in radii of the surfel
-  /// Gets the damaged pages, whose points are not seen; it must outlive the making of the view.
+  /// Gets the damaged pages, whose points are not seen; it must outlive the view.
   /// Null: damaged pages are errors.
   LostPages* lost = nullptr;
   /// Cap of the page cache and of what threads decode. Raised to what these need at least.

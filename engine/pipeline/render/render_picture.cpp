@@ -85,21 +85,25 @@ struct Part {
 };
 
 /// Returns the memory for meshes. While they are read, nothing else takes any.
-MeshLimits mesh_limits(const RenderRequest& request) {
+/// @param target  as for roomiest_temp_dir()
+MeshLimits mesh_limits(const RenderRequest& request, const std::filesystem::path& target) {
   constexpr std::uint64_t kOthers = std::uint64_t{96} << 20;  // a tile, rows, a gather, its pages
   constexpr std::uint64_t kLeast = std::uint64_t{26} << 20;   // refused rather than not seen
   const std::uint64_t left = budget_of(request.run.memory_bytes, "this picture").left();
   return {.reading = left,
+          .kept = kLeast,
           .traced = std::max(left > kOthers ? left - kOthers : 0, kLeast),
-          .temp_directory = roomiest_temp_dir(request.run, request.scene)};
+          .temp_directory = roomiest_temp_dir(request.run, target)};
 }
 
 /// Loads the meshes and finds the camera.
+/// @param target  as for roomiest_temp_dir()
 void load_subject(Subject& subject, const RenderRequest& request, const Part& part,
-                  const ContainerReader& scene, Progress& progress) {
+                  const ContainerReader& scene, const std::filesystem::path& target,
+                  Progress& progress) {
   std::vector<MeshCamera> cameras;
   LoadedMeshes meshes = load_meshes(request.meshes, request.mesh.get(), request.backdrop,
-                                    mesh_limits(request), progress, &cameras, "meshes");
+                                    mesh_limits(request, target), progress, &cameras, "meshes");
   if (meshes.parts) {
     progress.note("the meshes do not fit in memory: the camera sees the surfels");
   }
@@ -152,7 +156,7 @@ struct SurfelViewBytes {
 };
 
 /// Returns the memory of the view of a subject: a quarter of the cap may be a depth buffer of the
-/// whole picture.
+/// whole picture, or an eighth one of a part.
 SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,
                                   std::uint64_t cap) {
   const std::uint64_t all = subject.samples() * kSplatBytes;
@@ -160,7 +164,7 @@ SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighti
   const Tile tile = TileRenderer::tile_of(subject.camera.width, subject.side);
   const std::uint64_t least =
       depth_bytes_for(tile.width * subject.side, tile.height * subject.side);
-  return {std::max(cap / 4, least),
+  return {std::max(cap / 8, least),
           view_bytes(lighting.scene(), lighting.executor().threads(), lighting.back_end())};
 }
 
@@ -247,7 +251,7 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
     };
     const unsigned x0 = place(0, camera.width - width), y0 = place(1, camera.height - height);
     pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
-    subject.view->look_at(samples_of({x0, y0, width, height}, side));
+    subject.view->look_at(samples_of({x0, y0, width, height}, side), false);
     std::vector<std::optional<PrimaryHit>> hits(std::size_t{width} * height);
     executor.for_each(height, [&](std::size_t row, unsigned) {
       for (unsigned column = 0; column < width; ++column) {
@@ -347,7 +351,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   const LightRig lights =
       request.lights ? *request.lights : recorded_lights(lighting.scene(), progress);
   check_names(request, targets, lights.sky.map_path);
-  load_subject(subject, request, part, lighting.scene(), progress);
+  load_subject(subject, request, part, lighting.scene(), targets.front().path, progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
   const std::vector<LightRig> rigs = rigs_of_groups(lights, request.shadows);
@@ -406,7 +410,8 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   check_names(request, targets, rig.sky.map_path);
   Progress silent;
   const bool emits = may_emit(scene) || load_meshes(request.meshes, request.mesh.get(), false,
-                                                    mesh_limits(request), silent, nullptr, "meshes")
+                                                    mesh_limits(request, targets.front().path),
+                                                    silent, nullptr, "meshes")
                                             .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
   const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;

@@ -31,8 +31,9 @@ namespace ptc {
 /// A picture to render. LightingRequest has the scene, the quality and the resources.
 ///
 /// The camera sees `meshes` and `mesh` together or, without triangles there, the surfels of the
-/// scene. Either way the surfels light what it sees. Of a scene of meshes alone, for which a
-/// container is built for the run, the camera sees the meshes.
+/// scene; also where the triangles do not fit under the memory cap. Either way the surfels light
+/// what it sees. Of a scene of meshes alone, for which a container is built for the run, the camera
+/// sees the meshes.
 struct RenderRequest : LightingRequest {
   /// Mesh files that the camera sees; clouds among them are skipped.
   std::vector<std::filesystem::path> meshes;

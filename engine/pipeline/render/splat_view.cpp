@@ -140,6 +140,7 @@ SplatView::SplatView(const ContainerReader& scene, const Camera& camera, unsigne
 
 void SplatView::begin(const SampleRect& area) {
   area_ = area;
+  if (samples_.capacity() < area.samples()) samples_ = {};  // not both at once
   samples_.assign(area.samples(), {});
 }
 

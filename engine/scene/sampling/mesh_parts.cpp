@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <span>
 #include <utility>
 
@@ -90,6 +91,17 @@ std::uint64_t bytes_of(const Mesh& mesh) noexcept {
   constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
                           kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
   return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex;
+}
+
+std::uint64_t texture_bytes(const std::vector<Material>& materials) {
+  std::set<const Image*> textures{nullptr};
+  std::uint64_t pixels = 0;
+  for (const Material& material : materials) {
+    for (const Image* texture : {material.texture.get(), material.emission_texture.get()}) {
+      if (textures.insert(texture).second) pixels += texture->pixels.size();
+    }
+  }
+  return pixels * sizeof(glm::vec3);
 }
 
 std::uint64_t MeshParts::bytes() const noexcept {

@@ -15,6 +15,8 @@ namespace ptc {
 
 /// Returns the memory of a mesh, bytes, without textures.
 [[nodiscard]] std::uint64_t bytes_of(const Mesh& mesh) noexcept;
+/// Returns the memory of the textures of materials, bytes; what several share counts once.
+[[nodiscard]] std::uint64_t texture_bytes(const std::vector<Material>& materials);
 
 /// Meshes that do not fit in memory together.   Threads: const members may be called concurrently.
 class MeshParts {

@@ -10,11 +10,13 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
 #include <glm/common.hpp>
 
+#include "engine/io/file/disk_space.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
 #include "format/point_record.h"
@@ -93,7 +95,9 @@ PieceFile::PieceFile(const MeshParts& parts, const SurfaceSurvey& found, const S
                  sizeof(MeshTriangle::positions) +
                  (parts.has_uvs() ? sizeof(MeshTriangle::uvs) : 0) +
                  (parts.has_normals() ? sizeof(MeshTriangle::normals) : 0)),
-      file_(options.temp_dirs.front()) {
+      file_(*std::ranges::max_element(options.temp_dirs, {}, [](const std::filesystem::path& dir) {
+        return free_bytes({&dir, 1});
+      })) {
   sort(found, options, executor);
 }
 
@@ -217,8 +221,10 @@ void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options
   Writer writer(*this);
   for (auto& block : records) block.resize(kRowsAtOnce);
   while (const std::size_t count = read_full(*streams[0], records[0])) {
-    for (std::size_t g = 1; g < groups(); ++g)  // as many, of the same keys
-      static_cast<void>(read_full(*streams[g], std::span(records[g]).first(count)));
+    for (std::size_t g = 1; g < groups(); ++g) {
+      if (read_full(*streams[g], std::span(records[g]).first(count)) != count)
+        throw std::logic_error("PieceFile: the parts of a row have come apart");
+    }
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t g = 0; g < groups(); ++g)
         std::memcpy(packed.data() + g * kValueBytes, values_of(records[g][i]), kValueBytes);

@@ -84,7 +84,6 @@ class PieceFile {
   const SpacingField& field_;
   double patch_surfels_;
   std::size_t row_bytes_;
-  std::vector<std::filesystem::path> temp_dirs_;
   TempFile file_;
   std::vector<std::uint64_t> begins_{0};  ///< first piece of each patch, then the end
   std::vector<double> weights_{0};        ///< weight of all patches before each, then the total

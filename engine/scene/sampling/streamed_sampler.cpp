@@ -1,10 +1,6 @@
 #include "engine/scene/sampling/streamed_sampler.h"
 
-#include <algorithm>
-#include <cmath>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "engine/scene/ray_scene.h"
 #include "engine/scene/sampling/patch_sampler.h"
@@ -59,10 +55,8 @@ std::unique_ptr<PointSource> sample_parts(const MeshParts& parts, const SurfaceS
 }
 
 std::uint64_t streaming_bytes(const SurfaceSurvey& found, const SamplingOptions& options) noexcept {
-  const std::uint64_t surfels =
-      options.spacing > 0
-          ? static_cast<std::uint64_t>(found.area / (options.spacing * options.spacing))
-          : options.count;
+  const double square = options.spacing * options.spacing;
+  const auto surfels = static_cast<std::uint64_t>(square > 0 ? found.area / square : 0);
   return PieceFile::index_bytes(found.triangles, surfels, kPatchSurfels);
 }
 

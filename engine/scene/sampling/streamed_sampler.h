@@ -22,8 +22,8 @@ struct StreamingRoom {
   std::vector<std::filesystem::path> temp_dirs{"."};  ///< at least one
 };
 
-/// Makes a stream of surfels as sample_mesh() does, but without light: they emit and reflect
-/// nothing yet, and none counts as buried.
+/// Makes a stream of surfels as sample_mesh() does, but without light: they reflect nothing yet,
+/// and none counts as buried.
 ///
 /// Patches are smaller than those of sample_mesh(), so that the surfels are others, though as many
 /// and as even. They do not depend on the memory, the threads or the directories.
@@ -39,6 +39,7 @@ struct StreamingRoom {
                                                         const Executor& executor);
 
 /// Returns the bytes that this takes in addition to MeshParts::bytes() and the room.
+/// @param options  with_spacing()
 [[nodiscard]] std::uint64_t streaming_bytes(const SurfaceSurvey& found,
                                             const SamplingOptions& options) noexcept;
 

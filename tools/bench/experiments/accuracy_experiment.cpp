@@ -128,7 +128,8 @@ Experiment make_accuracy_experiment() {
     d.words("--set", options->sets,
             "Shade only these receivers: pixels of a picture, or points of the scene, in blocks of "
             "neighbours or far apart; repeatable");
-    for (const char* name : {"--setting", "--method", "--set"}) d.for_experts(name);
+    d.count("--sparse", scene.sparse_points, "Receivers far apart", "3k");
+    for (const char* name : {"--setting", "--method", "--set", "--sparse"}) d.for_experts(name);
     // Shade the middle of the picture, not a smaller picture: receivers keep their distance, and so
     // their share of common work
     d.quick(scene.shaded_width, 192);
@@ -136,7 +137,7 @@ Experiment make_accuracy_experiment() {
     d.quick(scene.window_width, 48);
     d.quick(scene.window_height, 27);
     d.quick(scene.own_points, 8'192);
-    d.quick(scene.sparse_points, 1'000);
+    d.quick("--sparse", scene.sparse_points, 1'000);
     d.quick(options->rays, {64, 256, 1024, 4096});
     d.quick(options->plain_solid_angles, {0.01F});
   };

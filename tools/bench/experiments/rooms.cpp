@@ -83,15 +83,17 @@ Image side_by_side(const std::vector<Image>& images) {
 void write_layers(const std::filesystem::path& path, const Image& ours, const Image& paths,
                   const std::vector<float>& errors) {
   const auto layer = [](const char* name, const Image& image) {
-    ExrLayer colours{.name = name, .full_float = true};
+    ExrLayer colours{{name, ExrLayerType::Kind::colour, true}, {}};
     for (const glm::vec3& p : image.pixels)
       colours.values.insert(colours.values.end(), {p.x, p.y, p.z});
     return colours;
   };
-  write_exr(path, ours.width, ours.height,
-            {layer("", ours),
-             layer("paths", paths),
-             {.name = "flip", .kind = ExrLayer::Kind::scalar, .values = errors}});
+  std::vector<ExrLayer> layers{layer("", ours), layer("paths", paths)};
+  ExrLayer& flip = layers.emplace_back();
+  flip.name = "flip";
+  flip.kind = ExrLayerType::Kind::scalar;
+  flip.values = errors;
+  write_exr(path, ours.width, ours.height, layers);
 }
 
 /// A scene that is built, with everything that both pictures need.
