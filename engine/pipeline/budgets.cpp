@@ -57,10 +57,14 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
       ContainerReader::kPageBytes * container.page_count() * (container.parts().empty() ? 1 : 2));
 }
 
+void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials) {
+  if (const std::uint64_t bytes = texture_bytes(materials); bytes > 0)
+    budget.charge("textures", bytes);
+}
+
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
   budget.charge("the mesh", bytes_of(mesh));
-  if (const std::uint64_t bytes = texture_bytes(mesh.materials); bytes > 0)
-    budget.charge("textures", bytes);
+  charge_textures(budget, mesh.materials);
   if (rays) budget.charge("rays at the mesh", rays->bytes());
 }
 

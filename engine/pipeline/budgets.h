@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <vector>
 
 #include "engine/base/memory_budget.h"
 #include "engine/cache/page_cache.h"
@@ -48,6 +49,9 @@ struct ThreadsThatFit {
 
 /// Charges the directory that an open container keeps in memory.
 void charge_directory(MemoryBudget& budget, const ContainerReader& container);
+
+/// Charges the textures of materials.
+void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials);
 
 /// Charges a mesh and what Embree keeps of it.
 /// @param rays  the ray scene of the mesh; null when the mesh is not traced

@@ -43,6 +43,14 @@ struct City {
   }
 };
 
+/// Returns a camera that sees all of a scene.
+Camera camera_of(const ContainerReader& scene, unsigned width, unsigned height) {
+  Camera camera = overview(scene, {0, 1, 0}, {}, {});
+  camera.width = width;
+  camera.height = height;
+  return camera;
+}
+
 }  // namespace
 
 TEST_CASE("cloud picture: neither threads nor the cap change a pixel",
@@ -65,9 +73,7 @@ TEST_CASE("cloud picture: a view of parts sees what a view of the whole picture 
   const ContainerReader scene(city.request.scene);
   const ThreadPool executor(2);
   Progress silent;
-  Camera camera = overview(scene, {0, 1, 0}, {}, {});
-  camera.width = 401;
-  camera.height = 350;
+  Camera camera = camera_of(scene, 401, 350);
   for (const double share : {1.0, 0.2}) {
     camera.position = camera.look_at + share * (camera.position - camera.look_at);
     SurfelViewOptions options{.side = 2, .lift = 0.15F};
@@ -150,9 +156,7 @@ TEST_CASE("cloud picture: variants by turns shade what each shades alone",
   const ContainerReader scene(city.request.scene);
   const ThreadPool executor(2);
   Progress silent;
-  Camera camera = overview(scene, {0, 1, 0}, {}, {});
-  camera.width = 240;
-  camera.height = 135;
+  const Camera camera = camera_of(scene, 240, 135);
   const auto view = view_surfels(scene, camera, {.lift = 0.15F}, executor, silent);
   std::vector<Receiver> receivers;
   for (unsigned y = 0; y < camera.height; ++y) {

@@ -20,24 +20,18 @@
 #include "engine/io/cloud/point_format.h"
 #include "engine/io/file/buffered_output.h"
 #include "engine/io/mesh/mesh_soup.h"
+#include "engine/io/mesh/soup_rules.h"
 #include "engine/io/text/text.h"
 
 namespace ptc {
 namespace {
 
-glm::vec3 flat_normal(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle) {
-  const glm::dvec3 a(mesh.positions[triangle[0]]);
-  const glm::dvec3 cross = glm::cross(glm::dvec3(mesh.positions[triangle[1]]) - a,
-                                      glm::dvec3(mesh.positions[triangle[2]]) - a);
-  const double length = glm::length(cross);
-  return length > 0 ? glm::vec3(cross / length) : glm::vec3(0, 0, 1);
-}
-
 // Gives each triangle its own three vertices, with the normal of its plane.
 void flatten(Mesh& mesh) {
   Mesh flat;
   for (auto& triangle : mesh.triangles) {
-    const glm::vec3 normal = flat_normal(mesh, triangle);
+    const auto at = [&](std::size_t k) { return mesh.positions[triangle[k]]; };
+    const glm::vec3 normal = flat_normal(at(0), at(1), at(2));
     for (std::uint32_t& vertex : triangle) {
       flat.positions.push_back(mesh.positions[vertex]);
       flat.normals.push_back(normal);

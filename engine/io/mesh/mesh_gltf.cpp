@@ -237,7 +237,7 @@ class GltfMesh {
     if (!index) return;
     const glm::dmat3 turn = normal_transform(world);
     document_.read(document_.find_elements(*index, 3, count), [&](std::span<const double> n) {
-      soup_.normals.push_back(glm::vec3(turn * glm::dvec3(n[0], n[1], n[2])));
+      soup_.add_normal(glm::vec3(turn * glm::dvec3(n[0], n[1], n[2])));
     });
   }
 
@@ -252,7 +252,7 @@ class GltfMesh {
       const glm::dvec2 scaled = material.place.scale * glm::dvec2(uv[0], uv[1]);
       const double u = material.place.offset.x + cosine * scaled.x + sine * scaled.y;
       const double v = material.place.offset.y - sine * scaled.x + cosine * scaled.y;
-      soup_.uvs.push_back({u, 1 - v});  // v of glTF grows downwards
+      soup_.add_uv({u, 1 - v});  // v of glTF grows downwards
     });
   }
 

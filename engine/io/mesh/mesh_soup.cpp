@@ -42,20 +42,10 @@ struct Soup {
 }
 
 void check_corners(MeshSoup& soup) {
-  const auto within = [](std::uint32_t index, std::size_t size) {
-    return index == kNone || index < size;
-  };
   std::size_t corner = 0;
   for (std::size_t i = 0; i < soup.polygons.size(); ++i) {
-    for (const std::size_t end = corner + soup.polygons.items()[i].corners; corner < end;
-         ++corner) {
-      Corner& c = soup.corners.items()[corner];
-      c = soup.valid(c);
-      if (c.position >= soup.positions.size() || !within(c.normal, soup.normals.size()) ||
-          !within(c.uv, soup.uvs.size())) {
-        refuse(soup.path(), "polygon " + std::to_string(i) + ": an index refers to no vertex");
-      }
-    }
+    for (const std::size_t end = corner + soup.polygons.items()[i].corners; corner < end; ++corner)
+      soup.corners.items()[corner] = soup.checked(soup.corners.items()[corner], i);
   }
 }
 
@@ -204,6 +194,17 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
 
 }  // namespace
 
+MeshSoup::Corner MeshSoup::checked(Corner corner, std::uint64_t polygon) const {
+  const auto within = [](std::uint32_t index, std::uint64_t size) {
+    return index == kNone || index < size;
+  };
+  if (uvs_dropped_) corner.uv = kNone;
+  if (corner.position >= positions.size() || !within(corner.normal, normals.size()) ||
+      !within(corner.uv, uvs.size()))
+    refuse(path_, "polygon " + std::to_string(polygon) + ": an index refers to no vertex");
+  return corner;
+}
+
 std::size_t MeshSoup::add_material(Material material) {
   if (materials.size() == kMaxMaterials) refuse(path_, "the file has more than 65,536 materials");
   materials.push_back(std::move(material));
@@ -224,7 +225,7 @@ void MeshSoup::drop_uvs() {
 }
 
 std::uint64_t MeshSoup::peak_bytes() const noexcept {
-  // Of each list itself, and of what build_mesh() makes of it before it is freed
+  // The bytes of an item of each list, and of what build_mesh() makes of it before it is freed
   return 12 * corners.size() + 94 * triangles_ + 8 * polygons.size() + 56 * positions.size() +
          40 * normals.size() + 24 * uvs.size();
 }

@@ -66,7 +66,7 @@ class MeshSoup {
   /// Says whether the lists are on the disk, because the mesh would not fit in memory.
   [[nodiscard]] bool spilled() const noexcept { return positions.spilled(); }
   /// Adds a position, world coordinates.
-  /// @throws LimitError, std::system_error as MeshRoom describes
+  /// @throws std::system_error when the lists go to the disk and cannot
   void add_position(const glm::dvec3& position) {
     positions.push_back(position);
     if (positions.size() % kItemsBetweenChecks == 0) check_room();
@@ -85,16 +85,15 @@ class MeshSoup {
   /// @throws DataError when there are 65,536 materials already
   std::size_t add_material(Material material);
   /// Adds a polygon with an index of a material.
-  /// @throws LimitError, std::system_error as MeshRoom describes
+  /// @throws as add_position()
   void add_polygon(std::span<const Corner> polygon, std::size_t material);
   /// Removes all texture coordinates. It is for readers that gave every corner an index before they
   /// knew that the file has no coordinates.
   void drop_uvs();
   /// Returns a corner as readers gave it, but for what drop_uvs() removed.
-  [[nodiscard]] Corner valid(Corner corner) const noexcept {
-    if (uvs_dropped_) corner.uv = kNone;
-    return corner;
-  }
+  /// @param polygon  number of its polygon, for the error
+  /// @throws DataError when one of its indices is out of range
+  [[nodiscard]] Corner checked(Corner corner, std::uint64_t polygon) const;
   /// Ends the lists: leaves them in memory or on the disk, as MeshRoom describes.
   void settle();
   /// Returns the memory that build_mesh() takes at its peak, bytes.

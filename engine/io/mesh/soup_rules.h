@@ -23,12 +23,13 @@ namespace ptc {
   return glm::cross(glm::dvec3(b) - at, glm::dvec3(c) - at) != glm::dvec3(0);
 }
 
-/// Returns the unit normal of a triangle that has an area.
+/// Returns the unit normal of a triangle; +z for one without an area.
 [[nodiscard]] inline glm::vec3 flat_normal(const glm::vec3& a, const glm::vec3& b,
                                            const glm::vec3& c) {
   const glm::dvec3 at(a);
   const glm::dvec3 flat = glm::cross(glm::dvec3(b) - at, glm::dvec3(c) - at);
-  return glm::vec3(flat / glm::length(flat));
+  const double length = glm::length(flat);
+  return length > 0 ? glm::vec3(flat / length) : glm::vec3(0, 0, 1);
 }
 
 /// Scales a normal to unit length. One that cannot be scaled becomes 0, which means missing.

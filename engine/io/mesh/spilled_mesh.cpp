@@ -63,15 +63,7 @@ class TriangleReader {
     of_polygon_.clear();
     world_.clear();
     for (std::uint64_t i = first; i < first + count; ++i) {
-      const Corner corner = soup_.valid(corners_[i]);
-      const auto within = [](std::uint32_t index, std::uint64_t size) {
-        return index == kNone || index < size;
-      };
-      if (corner.position >= soup_.positions.size() ||
-          !within(corner.normal, soup_.normals.size()) || !within(corner.uv, soup_.uvs.size())) {
-        throw DataError(soup_.path().string() + ": polygon " + std::to_string(polygon) +
-                        ": an index refers to no vertex");
-      }
+      const Corner corner = soup_.checked(corners_[i], polygon);
       of_polygon_.push_back(corner);
       world_.push_back(positions_[corner.position]);
     }

@@ -325,8 +325,7 @@ class Build {
     }
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
       budget.charge("the meshes", streamed->parts.bytes());
-      if (const std::uint64_t bytes = texture_bytes(streamed->parts.materials()); bytes > 0)
-        budget.charge("textures", bytes);
+      charge_textures(budget, streamed->parts.materials());
       const std::uint64_t fixed =
           streaming_bytes(streamed->found, with_spacing(request_.sampling, streamed->found.area));
       room.streaming.memory_bytes =

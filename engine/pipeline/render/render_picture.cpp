@@ -150,8 +150,8 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
 /// The memory of a view of surfels.
 struct SurfelViewBytes {
   std::uint64_t depth = 0;  ///< of its depth buffer
-  /// Of its pages as long as it lives; 0: it holds the whole picture, and its pages are those of a
-  /// gather that does not live yet.
+  /// Memory of the pages that a view of parts keeps; 0 for a view of the whole picture, which is
+  /// made with the pages of the gather, before that begins.
   std::uint64_t pages = 0;
 };
 

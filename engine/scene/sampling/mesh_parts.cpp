@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/soup_rules.h"
 
 namespace ptc {
 namespace {
@@ -120,9 +121,7 @@ void MeshParts::visit(const SpilledMesh::Visit& visit) const {
       const bool flat = has_normals_ && triangle.normals[0] == glm::vec3(0);
       if (flat) {
         const auto& [a, b, c] = triangle.positions;
-        const glm::dvec3 at(a);
-        const glm::dvec3 cross = glm::cross(glm::dvec3(b) - at, glm::dvec3(c) - at);
-        triangle.normals.fill(glm::vec3(cross / glm::length(cross)));
+        triangle.normals.fill(flat_normal(a, b, c));
       }
       if (shift == glm::dvec3(0)) return;
       for (glm::vec3& position : triangle.positions)

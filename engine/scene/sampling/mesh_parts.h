@@ -25,7 +25,6 @@ class MeshParts {
   void add(Mesh mesh);
   void add(std::shared_ptr<const SpilledMesh> mesh);
 
-  [[nodiscard]] bool empty() const noexcept { return parts_.empty(); }
   /// The origin of the triangles that visit() gives: that of the first mesh.
   [[nodiscard]] const glm::dvec3& origin() const noexcept { return origin_; }
   /// The box around all triangles, world coordinates.

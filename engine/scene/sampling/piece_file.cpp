@@ -42,12 +42,6 @@ bool overlap(const glm::vec3& low_a, const glm::vec3& high_a, const glm::vec3& l
          low_a.z <= high_b.z && low_b.z <= high_a.z;
 }
 
-SubTriangle whole(const MeshTriangle& triangle) {
-  return {{glm::dvec2(0, 0), glm::dvec2(1, 0), glm::dvec2(0, 1)},
-          {glm::dvec3(triangle.positions[0]), glm::dvec3(triangle.positions[1]),
-           glm::dvec3(triangle.positions[2])}};
-}
-
 }  // namespace
 
 /// A piece and its triangle.
@@ -56,32 +50,31 @@ struct PieceFile::Row {
   std::uint32_t path = 0;
 };
 
+template <class AnyRow, class Move>
+void PieceFile::move_fields(AnyRow& row, const Move& move) const {
+  move(&row.path, sizeof row.path);
+  move(&row.triangle.material, sizeof row.triangle.material);
+  move(row.triangle.positions.data(), sizeof row.triangle.positions);
+  if (parts_.has_uvs()) move(row.triangle.uvs.data(), sizeof row.triangle.uvs);
+  if (parts_.has_normals()) move(row.triangle.normals.data(), sizeof row.triangle.normals);
+}
+
 void PieceFile::pack(const Row& row, std::byte* to) const noexcept {
-  const auto put = [&](const void* from, std::size_t bytes) {
-    std::memcpy(to, from, bytes);
+  move_fields(row, [&](const void* field, std::size_t bytes) {
+    std::memcpy(to, field, bytes);
     to += bytes;
-  };
-  put(&row.path, sizeof row.path);
-  put(&row.triangle.material, sizeof row.triangle.material);
-  put(row.triangle.positions.data(), sizeof row.triangle.positions);
-  if (parts_.has_uvs()) put(row.triangle.uvs.data(), sizeof row.triangle.uvs);
-  if (parts_.has_normals()) put(row.triangle.normals.data(), sizeof row.triangle.normals);
+  });
 }
 
 void PieceFile::unpack(const std::byte* from, Row& row) const noexcept {
-  const auto get = [&](void* to, std::size_t bytes) {
-    std::memcpy(to, from, bytes);
+  move_fields(row, [&](void* field, std::size_t bytes) {
+    std::memcpy(field, from, bytes);
     from += bytes;
-  };
-  get(&row.path, sizeof row.path);
-  get(&row.triangle.material, sizeof row.triangle.material);
-  get(row.triangle.positions.data(), sizeof row.triangle.positions);
-  if (parts_.has_uvs()) get(row.triangle.uvs.data(), sizeof row.triangle.uvs);
-  if (parts_.has_normals()) get(row.triangle.normals.data(), sizeof row.triangle.normals);
+  });
 }
 
 PieceFile::Box PieceFile::box_of(const Row& row) {
-  const SubTriangle shape = piece_of(whole(row.triangle), row.path);
+  const SubTriangle shape = piece_of(whole_triangle(row.triangle.positions), row.path);
   const glm::vec3 a(shape.corner[0]), b(shape.corner[1]), c(shape.corner[2]);
   return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
 }
@@ -91,13 +84,11 @@ PieceFile::PieceFile(const MeshParts& parts, const SurfaceSurvey& found, const S
     : parts_(parts),
       field_(field),
       patch_surfels_(surfels),
-      row_bytes_(sizeof(Row::path) + sizeof(MeshTriangle::material) +
-                 sizeof(MeshTriangle::positions) +
-                 (parts.has_uvs() ? sizeof(MeshTriangle::uvs) : 0) +
-                 (parts.has_normals() ? sizeof(MeshTriangle::normals) : 0)),
       file_(*std::ranges::max_element(options.temp_dirs, {}, [](const std::filesystem::path& dir) {
         return free_bytes({&dir, 1});
       })) {
+  const Row row;
+  move_fields(row, [&](const void* /*field*/, std::size_t bytes) { row_bytes_ += bytes; });
   sort(found, options, executor);
 }
 
@@ -117,7 +108,7 @@ class PieceFile::Writer {
     // Measure the piece
     Row row;
     to_.unpack(packed, row);
-    const SubTriangle shape = piece_of(whole(row.triangle), row.path);
+    const SubTriangle shape = piece_of(whole_triangle(row.triangle.positions), row.path);
     const double spacing = spacing_of(shape, to_.field_, to_.parts_.origin());
     const Box box = box_of(row);
     if (pieces_ % kBlockPieces == 0) {
@@ -198,7 +189,7 @@ void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options
     Row row;
     for (const MeshTriangle& triangle : triangles) {
       row.triangle = triangle;
-      cut_into_pieces(whole(triangle), field_, parts_.origin(),
+      cut_into_pieces(whole_triangle(triangle.positions), field_, parts_.origin(),
                       [&](const SubTriangle& shape, std::uint32_t path) {
                         row.path = path;
                         pack(row, packed.data());

@@ -76,6 +76,9 @@ class PieceFile {
   [[nodiscard]] std::size_t groups() const noexcept;
   void sort(const SurfaceSurvey& found, const PieceSortOptions& options, const Executor& executor);
   void read_rows(std::uint64_t first, std::span<Row> rows) const;
+  /// Calls move(field, bytes) for each field of a row that the file has, in the order of the file.
+  template <class AnyRow, class Move>
+  void move_fields(AnyRow& row, const Move& move) const;
   void pack(const Row& row, std::byte* to) const noexcept;
   void unpack(const std::byte* from, Row& row) const noexcept;
   [[nodiscard]] static Box box_of(const Row& row);
@@ -83,7 +86,7 @@ class PieceFile {
   const MeshParts& parts_;
   const SpacingField& field_;
   double patch_surfels_;
-  std::size_t row_bytes_;
+  std::size_t row_bytes_ = 0;
   TempFile file_;
   std::vector<std::uint64_t> begins_{0};  ///< first piece of each patch, then the end
   std::vector<double> weights_{0};        ///< weight of all patches before each, then the total

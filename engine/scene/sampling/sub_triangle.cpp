@@ -51,11 +51,14 @@ SubTriangle SubTriangle::half(bool second) const {
   return result;
 }
 
+SubTriangle whole_triangle(const std::array<glm::vec3, 3>& corners) {
+  return {{glm::dvec2(0, 0), glm::dvec2(1, 0), glm::dvec2(0, 1)},
+          {glm::dvec3(corners[0]), glm::dvec3(corners[1]), glm::dvec3(corners[2])}};
+}
+
 SubTriangle whole_triangle(const Mesh& mesh, std::uint32_t triangle) {
   const auto& c = mesh.triangles[triangle];
-  return {{glm::dvec2(0, 0), glm::dvec2(1, 0), glm::dvec2(0, 1)},
-          {glm::dvec3(mesh.positions[c[0]]), glm::dvec3(mesh.positions[c[1]]),
-           glm::dvec3(mesh.positions[c[2]])}};
+  return whole_triangle({mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]});
 }
 
 }  // namespace ptc

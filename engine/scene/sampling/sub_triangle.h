@@ -37,6 +37,9 @@ struct SubTriangle {
   [[nodiscard]] SubTriangle half(bool second) const;
 };
 
+/// Returns a whole triangle as a part of itself.
+/// @param corners  relative to Mesh::origin
+[[nodiscard]] SubTriangle whole_triangle(const std::array<glm::vec3, 3>& corners);
 /// Returns a whole triangle of a mesh as a part of itself.
 [[nodiscard]] SubTriangle whole_triangle(const Mesh& mesh, std::uint32_t triangle);
 
