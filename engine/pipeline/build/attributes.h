@@ -27,6 +27,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/stream.h"
 #include "engine/sort/external_sort.h"
+#include "engine/sort/record_values.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/point_record.h"
@@ -36,16 +37,11 @@ namespace ptc {
 
 /// The greatest size of the values of a point in one group, bytes: what a PointRecord holds behind
 /// its key.
-inline constexpr std::size_t kGroupBytes = sizeof(PointRecord) - sizeof(MortonKey);
+inline constexpr std::size_t kGroupBytes = kRecordValueBytes;
 /// The first group of channels that come from inputs; group 1 is for channels of shading.
 inline constexpr std::uint8_t kFirstInputGroup = 2;
 /// The name of the channel that holds the place of each point in its input.
 inline constexpr const char* kOriginalIndex = "original_index";
-
-/// Returns where the values of a group begin in a record.
-[[nodiscard]] inline std::byte* values_of(PointRecord& record) noexcept {
-  return reinterpret_cast<std::byte*>(&record) + sizeof(MortonKey);
-}
 
 /// Says whether two channels are the same in all but their group.
 [[nodiscard]] bool same_but_for_group(Channel a, const Channel& b);

@@ -19,6 +19,7 @@
 #include "engine/io/file/disk_space.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
+#include "engine/sort/record_values.h"
 #include "format/point_record.h"
 
 namespace ptc {
@@ -30,11 +31,6 @@ constexpr std::size_t kRowsAtOnce = std::size_t{1} << 12;
 // Surfels look for the surface up to this far beyond their patch: their radius is about 0.7
 // spacings, and they look for 1.1 radii along the surface and 0.9 away from it.
 constexpr float kMarginSpacings = 3;
-constexpr std::size_t kValueBytes = sizeof(PointRecord) - sizeof(MortonKey);
-
-std::byte* values_of(PointRecord& record) {
-  return reinterpret_cast<std::byte*>(&record) + sizeof(MortonKey);
-}
 
 bool overlap(const glm::vec3& low_a, const glm::vec3& high_a, const glm::vec3& low_b,
              const glm::vec3& high_b) {
@@ -93,7 +89,7 @@ PieceFile::PieceFile(const MeshParts& parts, const SurfaceSurvey& found, const S
 }
 
 std::size_t PieceFile::groups() const noexcept {
-  return (row_bytes_ + kValueBytes - 1) / kValueBytes;
+  return (row_bytes_ + kRecordValueBytes - 1) / kRecordValueBytes;
 }
 
 /// Writes the rows as they come out of the sorts, and closes patches and blocks.
@@ -177,7 +173,7 @@ void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options
   }
 
   // Cut the triangles
-  std::vector<std::byte> packed(groups() * kValueBytes);
+  std::vector<std::byte> packed(groups() * kRecordValueBytes);
   std::vector<std::vector<PointRecord>> records(groups());
   const auto hand_on = [&] {
     for (std::size_t g = 0; g < groups(); ++g) {
@@ -197,8 +193,8 @@ void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options
                         for (std::size_t g = 0; g < groups(); ++g) {
                           PointRecord& record = records[g].emplace_back();
                           record.key = key;
-                          std::memcpy(values_of(record), packed.data() + g * kValueBytes,
-                                      kValueBytes);
+                          std::memcpy(values_of(record), packed.data() + g * kRecordValueBytes,
+                                      kRecordValueBytes);
                         }
                         if (records[0].size() >= kRowsAtOnce) hand_on();
                       });
@@ -218,7 +214,8 @@ void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options
     }
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t g = 0; g < groups(); ++g)
-        std::memcpy(packed.data() + g * kValueBytes, values_of(records[g][i]), kValueBytes);
+        std::memcpy(packed.data() + g * kRecordValueBytes, values_of(records[g][i]),
+                    kRecordValueBytes);
       writer.add(packed.data());
     }
   }
