@@ -40,6 +40,13 @@ void check(const Image& image) {
   for (const glm::vec3& p : image.pixels) require(is_finite(p) && p.x >= 0 && p.y >= 0 && p.z >= 0);
 }
 
+void check(const Texture& texture) {
+  require(texture.width() > 0 && texture.height() > 0);
+  texture.visit_rows([](std::span<const glm::vec3> row) {
+    for (const glm::vec3& p : row) require(is_finite(p) && p.x >= 0 && p.y >= 0 && p.z >= 0);
+  });
+}
+
 void read_picture(const Path& path) {
   check(read_image(path));
 }

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/append.h"
 #include "engine/pipeline/scene_record.h"
 #include "format/node_page.h"
@@ -211,7 +212,8 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   request.input_names = inputs.names();
   request.sampling.camera = arguments.camera.camera();
   if (arguments.lights.given() || arguments.no_default_lights)
-    request.lights = arguments.lights.rig(ptc::up_of_files(request.inputs, request.up));
+    request.lights = arguments.lights.rig(ptc::up_of_files(request.inputs, request.up),
+                                          *ptc::texture_store(request.run, arguments.output));
   if (request.city_points > 0 && arguments.lights.given())
     throw CLI::ExcludesError("--city", "lights: the city has its own");
   if (!request.append.empty()) adopt_settings(arguments, command);

@@ -1,6 +1,7 @@
 // ptclight: lights the surfels of a scene anew.
 #include <fmt/format.h>
 
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
@@ -52,7 +53,8 @@ int main(int argc, char** argv) {
     request.run = command.run_options();
     scene.apply(request, output, progress);
     if (lights.given())
-      request.lights = lights.rig(ptc::up_of_files(ptc::scene_files(request), request.up));
+      request.lights = lights.rig(ptc::up_of_files(ptc::scene_files(request), request.up),
+                                  *ptc::texture_store(request.run, output));
     const ptc::LightReport report = ptc::light_container(request, output, progress);
     nlohmann::ordered_json facts{{"output", output.string()}};
     facts.update(ptc::facts_of(report));

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "engine/base/error.h"
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
@@ -148,7 +149,10 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   request.size = arguments.camera.size();
   if (arguments.lights.given() || request.camera) {
     const glm::vec3 up = ptc::up_of_files(ptc::scene_files(request), request.up);
-    if (arguments.lights.given()) request.lights = arguments.lights.rig(up);
+    if (arguments.lights.given()) {
+      request.lights =
+          arguments.lights.rig(up, *ptc::texture_store(request.run, arguments.outputs.front()));
+    }
     if (request.camera) request.camera->up = up;
   }
   std::vector<ptc::PictureTarget> targets = arguments.layers;

@@ -1,6 +1,7 @@
 // ptcshade: computes the light that arrives at every point of a scene, or at given receivers.
 #include <fmt/format.h>
 
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
@@ -105,7 +106,7 @@ int main(int argc, char** argv) {
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
     request.run = command.run_options();
     ptc::apply_preset(app, preset, request);
-    if (lights.sky_given()) request.sky = lights.sky();
+    if (lights.sky_given()) request.sky = lights.sky(*ptc::texture_store(request.run, output));
     scene.apply(request, output, progress);
     if (request.sky) request.sky->up = ptc::up_of_files(ptc::scene_files(request), request.up);
     const ptc::LightingReport report = ptc::shade_container(request, output, progress);

@@ -26,7 +26,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "engine/base/numbers.h"
-#include "engine/io/image/image.h"
+#include "engine/io/image/texture.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "tools/common.h"
@@ -280,8 +280,8 @@ bool LightArguments::given() const noexcept {
   return !suns_.empty() || !points_.empty() || !spots_.empty() || !groups_.empty() || sky_given();
 }
 
-LightRig LightArguments::rig(const glm::vec3& up) const {
-  LightRig rig{.points = points_, .spots = spots_, .sky = sky()};
+LightRig LightArguments::rig(const glm::vec3& up, TextureStore& store) const {
+  LightRig rig{.points = points_, .spots = spots_, .sky = sky(store)};
   rig.sky.up = up;
   for (const SunPlace& sun : suns_) {
     rig.suns.push_back({.to_sun = sun_direction(sun.azimuth, sun.elevation, up),
@@ -292,14 +292,14 @@ LightRig LightArguments::rig(const glm::vec3& up) const {
   return rig;
 }
 
-Sky LightArguments::sky() const {
+Sky LightArguments::sky(TextureStore& store) const {
   Sky sky;
   if (sky_.empty()) return sky;
   sky.radiance = sky_radiance_.value_or(glm::vec3(1)) * sky_scale_;
   if (sky_radiance_) return sky;
   check_input(sky_);
   sky.map_path = sky_;
-  sky.map = std::make_shared<const Image>(read_image(sky_));
+  sky.map = std::make_shared<const Texture>(store.read(sky_));
   return sky;
 }
 

@@ -28,12 +28,12 @@ class LightArguments {
   [[nodiscard]] bool given() const noexcept;
   /// True when --sky was given.
   [[nodiscard]] bool sky_given() const noexcept { return !sky_.empty(); }
-  /// The lights that were given. Reads the picture of the sky.
+  /// The lights that were given. The picture of the sky is read into `store`.
   /// @param up  the axis that points up
-  /// @throws DataError when the file of the sky is not a picture
-  [[nodiscard]] LightRig rig(const glm::vec3& up) const;
+  /// @throws as TextureStore::read()
+  [[nodiscard]] LightRig rig(const glm::vec3& up, TextureStore& store) const;
   /// The sky that was given, black without one. Reads its picture as rig() does.
-  [[nodiscard]] Sky sky() const;
+  [[nodiscard]] Sky sky(TextureStore& store) const;
 
  private:
   void set_suns(const std::vector<std::string>& values);

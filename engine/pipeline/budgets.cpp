@@ -5,6 +5,7 @@
 
 #include "engine/base/error.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/scene/light/sky_map.h"
 #include "engine/scene/sampling/mesh_parts.h"
 #include "engine/store/commit.h"
 #include "engine/trace/disc_tracer.h"
@@ -60,6 +61,18 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
 void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials) {
   if (const std::uint64_t bytes = texture_bytes(materials); bytes > 0)
     budget.charge("textures", bytes);
+}
+
+std::shared_ptr<TextureStore> texture_store(const RunOptions& run,
+                                            const std::filesystem::path& target) {
+  return TextureStore::make(run.memory_bytes / 4, roomiest_temp_dir(run, target));
+}
+
+void charge_sky(MemoryBudget& budget, const Sky& sky) {
+  if (!sky.map) return;
+  const TextureStore* const store = sky.map->store();
+  budget.charge("the picture of the sky",
+                sky.map->bytes() + (store ? store->cache_bytes() : 0) + SkyDensity::bytes(sky));
 }
 
 void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {

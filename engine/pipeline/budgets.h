@@ -8,12 +8,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "engine/base/memory_budget.h"
 #include "engine/cache/page_cache.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/run.h"
+#include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/store/reader.h"
 
@@ -52,6 +54,14 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container);
 
 /// Charges the textures of materials.
 void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials);
+
+/// Returns what reads the pictures of a run, textures or a sky, into a quarter of its cap.
+/// @param target  as for roomiest_temp_dir()
+[[nodiscard]] std::shared_ptr<TextureStore> texture_store(const RunOptions& run,
+                                                          const std::filesystem::path& target);
+
+/// Charges the picture of a sky, and what draws directions by its brightness.
+void charge_sky(MemoryBudget& budget, const Sky& sky);
 
 /// Charges a mesh and what Embree keeps of it.
 /// @param rays  the ray scene of the mesh; null when the mesh is not traced

@@ -61,11 +61,12 @@ LightRig recorded_rig(const ContainerReader& container) {
   return found == text.end() ? LightRig() : light_rig_from_json(found->second);
 }
 
-LightRig recorded_lights(const ContainerReader& container, Progress& progress) {
+LightRig recorded_lights(const ContainerReader& container, TextureStore& store,
+                         Progress& progress) {
   LightRig rig = recorded_rig(container);
   const std::string file = container.path().string();
   try {
-    if (load_sky_map(rig.sky, directory_of(container.path())) == SkyMap::changed) {
+    if (load_sky_map(rig.sky, directory_of(container.path()), store) == SkyMap::changed) {
       progress.note(file + ": the sky picture " + rig.sky.map_path +
                     " has changed since it lit the scene's surfels");
     }

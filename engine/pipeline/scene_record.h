@@ -58,7 +58,8 @@ void join_texts(std::map<std::string, std::string>& text,
 /// @param progress  gets a note when the picture is no longer the one that was recorded
 /// @throws DataError when the record is no light rig, or names a picture that does not exist or is
 ///         damaged; std::system_error
-[[nodiscard]] LightRig recorded_lights(const ContainerReader& container, Progress& progress);
+[[nodiscard]] LightRig recorded_lights(const ContainerReader& container, TextureStore& store,
+                                       Progress& progress);
 
 /// Returns the text that records a rig. The path of its sky picture is made absolute.
 /// @throws RequestError when the sky has a picture and no path

@@ -94,18 +94,13 @@ Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const 
   return s;
 }
 
-// Checks the numbers of a material, and that its texture has all its pixels.
+// Checks the numbers of a material.
 void check_material(const Material& material, const char* field) {
   for (int k = 0; k < 3; ++k) {
     require_request(material.albedo[k] >= 0 && material.albedo[k] <= 1, field,
                     "mesh: the albedo of a material is not 0 to 1");
     require_request(material.emission[k] >= 0 && std::isfinite(material.emission[k]), field,
                     "mesh: the emission of a material is negative or not finite");
-  }
-  for (const Image* const image : {material.texture.get(), material.emission_texture.get()}) {
-    require_request(
-        image == nullptr || image->pixels.size() == std::size_t{image->width} * image->height,
-        field, "mesh: a texture has another number of pixels than its size says");
   }
 }
 
@@ -151,7 +146,7 @@ struct RayScene::Impl {
   [[nodiscard]] glm::dvec3 shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
                                           double v, const glm::dvec3& geometric) const;
   // Returns the colour of a texture at a place on a triangle; white without a texture.
-  [[nodiscard]] glm::vec3 texture_at(const Image* texture,
+  [[nodiscard]] glm::vec3 texture_at(const Texture* texture,
                                      const std::array<std::uint32_t, 3>& corners, float u,
                                      float v) const;
 
@@ -253,7 +248,7 @@ glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& co
   return side < 0 ? normal - 2 * side * geometric : normal;  // mirror it at the surface
 }
 
-glm::vec3 RayScene::Impl::texture_at(const Image* texture,
+glm::vec3 RayScene::Impl::texture_at(const Texture* texture,
                                      const std::array<std::uint32_t, 3>& corners, float u,
                                      float v) const {
   if (texture == nullptr || mesh.uvs.empty()) return glm::vec3(1);

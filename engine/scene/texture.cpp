@@ -3,6 +3,7 @@
 #include "engine/scene/texture.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 
@@ -35,11 +36,21 @@ Pair neighbours(double at, unsigned size, Border border) {
           static_cast<float>(at - 0.5 - low)};
 }
 
-glm::vec3 blend(const Image& image, const Pair& x, const Pair& y) {
-  const glm::vec3 top = glm::mix(image.at(x.first, y.first), image.at(x.second, y.first), x.share);
-  const glm::vec3 bottom =
-      glm::mix(image.at(x.first, y.second), image.at(x.second, y.second), x.share);
-  return glm::mix(top, bottom, y.share);
+// Returns two pixels of a row, which mostly lie side by side.
+std::array<glm::vec3, 2> both(const Texture& image, const Pair& x, unsigned y) {
+  std::array<glm::vec3, 2> pixels;
+  if (x.second == x.first + 1) {
+    image.read(x.first, y, pixels);
+  } else {
+    pixels = {image.at(x.first, y), image.at(x.second, y)};
+  }
+  return pixels;
+}
+
+glm::vec3 blend(const Texture& image, const Pair& x, const Pair& y) {
+  const auto top = both(image, x, y.first), bottom = both(image, x, y.second);
+  return glm::mix(glm::mix(top[0], top[1], x.share), glm::mix(bottom[0], bottom[1], x.share),
+                  y.share);
 }
 
 // The part of a coordinate behind the point, in [0, 1); 0 for one that is not finite.
@@ -50,15 +61,15 @@ double fraction(float coordinate) {
 
 }  // namespace
 
-glm::vec3 sample_texture(const Image& image, const glm::vec2& uv) {
-  if (image.pixels.empty()) return glm::vec3(1);
-  return blend(image, neighbours(fraction(uv.x) * image.width, image.width, Border::wrap),
-               neighbours((1 - fraction(uv.y)) * image.height, image.height, Border::wrap));
+glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv) {
+  if (image.size() == 0) return glm::vec3(1);
+  return blend(image, neighbours(fraction(uv.x) * image.width(), image.width(), Border::wrap),
+               neighbours((1 - fraction(uv.y)) * image.height(), image.height(), Border::wrap));
 }
 
-glm::vec3 sample_panorama(const Image& image, double x, double y) {
-  return blend(image, neighbours(x, image.width, Border::wrap),
-               neighbours(y, image.height, Border::end));
+glm::vec3 sample_panorama(const Texture& image, double x, double y) {
+  return blend(image, neighbours(x, image.width(), Border::wrap),
+               neighbours(y, image.height(), Border::end));
 }
 
 }  // namespace ptc

@@ -4,7 +4,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "engine/io/image/image.h"
+#include "engine/io/image/texture.h"
 
 namespace ptc {
 
@@ -12,12 +12,14 @@ namespace ptc {
 /// @param uv  texture coordinates; v = 1 is the top of row 0. A coordinate that is not finite
 ///            counts as 0.
 /// @return    white where the picture has no pixels
-[[nodiscard]] glm::vec3 sample_texture(const Image& image, const glm::vec2& uv);
+/// @throws as Texture::at()
+[[nodiscard]] glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv);
 
 /// Returns the bilinear value of a latitude-longitude map. Columns wrap around; the first and the
 /// last row go on beyond the map as they are.
 /// @param image  has at least one pixel
 /// @param x, y   place in pixels; 0 is the left or the top border of the picture
-[[nodiscard]] glm::vec3 sample_panorama(const Image& image, double x, double y);
+/// @throws as Texture::at()
+[[nodiscard]] glm::vec3 sample_panorama(const Texture& image, double x, double y);
 
 }  // namespace ptc

@@ -4,9 +4,11 @@ import array
 import json
 import math
 import os
+import struct
 import subprocess
 import tempfile
 import unittest
+import zlib
 
 from programs import BIN, ProgramTest
 
@@ -56,6 +58,31 @@ class Caps(ProgramTest):
         for scene, cap in (([self.cloud], 224), ([self.mesh, "--points", "3k"], 160)):
             self.peak(0, cap, "ptcrender", *scene, *picture)
             self.assertGreater((self.here / "o.exr").stat().st_size, 100_000)
+
+    def test_textures_and_skies_larger_than_the_cap_go_through_tiles(self):
+        side = 8192
+        chunk = lambda name, data: struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+        pixels, row = zlib.compressobj(1), bytes(v for x in range(side) for v in (x & 255, x >> 6, 128))
+        data = b"".join(pixels.compress(b"\0" + row) for _ in range(side)) + pixels.flush()
+        (self.here / "wide.png").write_bytes(
+            b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 2, 0, 0, 0)) +
+            chunk(b"IDAT", data) + chunk(b"IEND", b""))
+        row = bytes((2, 2, side >> 8, side & 255)) + 4 * (bytes((255, 128)) * (side // 127) + bytes((128 + side % 127, 128)))
+        (self.here / "sky.hdr").write_bytes(
+            b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % (side // 2, side) + row * (side // 2))
+        (self.here / "floor.mtl").write_text("newmtl floor\nmap_Kd wide.png\n")
+        (self.here / "floor.obj").write_text(
+            "mtllib floor.mtl\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+            "usemtl floor\nf 1/1 4/4 3/3 2/2\n")
+        scene = self.here / "floor.ptcx"
+        said = self.peak(0, 160, "ptcbuild", self.here / "floor.obj", "--points", "3k", "--sky", self.here / "sky.hdr",
+                         "-o", scene)
+        self.assertNotIn("wide.png", said)
+        self.peak(0, 160, "ptclight", scene, "-o", self.here / "lit.ptcx")
+        self.peak(0, 160, "ptcrender", scene, "--mesh", self.here / "floor.obj", "--size", "64x36", "-o",
+                  self.here / "o.exr")
+        said = self.peak(5, 40, "ptcbuild", self.here / "floor.obj", "--sky", self.here / "sky.hdr", "-o", scene)
+        self.assertIn("the picture of the sky", said)
 
     def test_a_sparse_buffer_of_a_gltf_is_not_taken_into_memory(self):
         count = 20_000_000

@@ -267,7 +267,7 @@ TEST_CASE("lit rooms: a lamp with a texture lights what is near each part of it"
       picture.pixels.push_back(bright ? glm::vec3(1, 0.7F, 0.4F) : glm::vec3(0.002F));
     }
   }
-  mesh.materials[kLamp].emission_texture = std::make_shared<const Image>(picture);
+  mesh.materials[kLamp].emission_texture = std::make_shared<const Texture>(picture);
   check_errors(mesh, {});
 }
 

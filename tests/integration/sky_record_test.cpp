@@ -50,7 +50,7 @@ struct Lit {
   [[nodiscard]] std::filesystem::path scene() const { return dir / "scene.ptcx"; }
   [[nodiscard]] Sky sky() const {
     return {.radiance = glm::vec3(1),
-            .map = std::make_shared<const Image>(read_image(picture())),
+            .map = std::make_shared<const Texture>(read_image(picture())),
             .map_path = picture().string()};
   }
   std::vector<char> shaded(const std::optional<Sky>& sky, const char* name = "shaded.ply") {

@@ -231,7 +231,7 @@ TEST_CASE("tuning: receivers far apart are shaded by rays where these cost less"
   ShadeRequest lit{{.scene = dir.path() / "city.ptcx", .error = 0.02}};
   lit.count = 1500;
   lit.sky = Sky{.radiance = glm::vec3(1),
-                .map = std::make_shared<const Image>(
+                .map = std::make_shared<const Texture>(
                     Image{.width = 2, .height = 1, .pixels = {glm::vec3(1), glm::vec3(2)}})};
   CHECK(shade_container(lit, dir.path() / "lit.ply", silent).tuning->receiver_rays == 0);
   // A coarse gather costs less

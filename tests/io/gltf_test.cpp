@@ -218,13 +218,13 @@ TEST_CASE("gltf: materials have factor, texture, emission and sides", "[io][gltf
   const MeshFile textured = files.read(json);
   CHECK(textured.mesh.materials[0].emission == glm::vec3(20, 10, 0));
   REQUIRE(textured.mesh.materials[0].emission_texture);
-  CHECK(textured.mesh.materials[0].emission_texture->width == 2);
+  CHECK(textured.mesh.materials[0].emission_texture->width() == 2);
   CHECK(textured.warnings.empty());
   json["materials"][0]["emissiveTexture"]["texCoord"] = 1;
   const MeshFile lit = files.read(json);
   CHECK_FALSE(lit.mesh.materials[0].emission_texture);
   CHECK(lit.mesh.materials[0].emission == glm::vec3(10, 0, 0));
-  CHECK(lit.mesh.materials[0].texture->width == 2);
+  CHECK(lit.mesh.materials[0].texture->width() == 2);
   CHECK(lit.warnings.size() == 1);
 
   // A missing texture is a warning.

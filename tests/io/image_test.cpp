@@ -256,22 +256,17 @@ TEST_CASE("image: an HDR with empty runs or with two different sizes is refused,
   CHECK_THROWS_AS(decode(whole.substr(0, pixels + 4) + std::string(60, '\0'), "a"), DataError);
   std::string third = whole.substr(0, pixels + 6);
   CHECK_THROWS_AS(decode(third.insert(pixels - 1, " 9"), "a"), DataError);
-  std::string ended = whole.substr(0, pixels + 6) + "\n\n-Y 1 +X 1\n1234";
-  CHECK_THROWS_AS(decode(ended.insert(ended.find("\n\n") + 1, "\0x", 2), "a"), DataError);
 }
 
-TEST_CASE("jpeg: as many scans as encoders write are read, and more are refused by offset",
-          "[io][image]") {
-  for (const bool progressive : {true, false}) {
-    CHECK(decode(grey_jpeg({.scans = 10, .progressive = progressive}), "a").width == 8);
-    CHECK(decode(grey_jpeg({.scans = 100, .progressive = progressive}), "a").width == 8);
-    const std::string whole = grey_jpeg({.scans = 101, .progressive = progressive});
-    CHECK_THROWS_WITH(decode(whole, "a.jpg"), "a.jpg: offset " +
-                                                  std::to_string(whole.rfind("\xff\xda")) +
-                                                  ": the JPEG has more than 100 scans");
-    CHECK_THROWS_AS(decode(grey_jpeg({.scans = 20'000, .progressive = progressive}), "a"),
-                    DataError);
+TEST_CASE("jpeg: as many scans as encoders write are read, and more are refused", "[io][image]") {
+  CHECK(decode(grey_jpeg({.scans = 1, .progressive = false}), "a").width == 8);
+  CHECK(decode(grey_jpeg({.scans = 10}), "a").width == 8);
+  CHECK(decode(grey_jpeg({.scans = 100}), "a").width == 8);
+  for (const int scans : {101, 20'000}) {
+    CHECK_THROWS_WITH(decode(grey_jpeg({.scans = scans}), "a.jpg"),
+                      Contains("a.jpg: offset ") && Contains("the JPEG has more than 100 scans"));
   }
+  CHECK_THROWS_AS(decode(grey_jpeg({.scans = 2, .progressive = false}), "a"), DataError);
 }
 
 TEST_CASE("jpeg: scans of a large picture are refused when they add up to 2^32 pixels",
@@ -280,8 +275,7 @@ TEST_CASE("jpeg: scans of a large picture are refused when they add up to 2^32 p
   const std::string whole =
       grey_jpeg({.side = 16'384, .scans = 17, .comments = 40'000, .progressive = true});
   CHECK_THROWS_WITH(decode(whole, "a.jpg"),
-                    "a.jpg: offset " + std::to_string(whole.rfind("\xff\xda")) +
-                        ": the scans of the JPEG have more than 2^32 pixels together");
+                    Contains("the scans of the JPEG have more than 2^32 pixels together"));
 }
 
 TEST_CASE("image: a small file cannot claim many pixels", "[io][image]") {

@@ -2,6 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/image/byte_range.h"
 #include "engine/io/mesh/mesh_soup.h"
 #include "tests/io/files.h"
 
@@ -191,14 +192,14 @@ TEST_CASE("textures: pictures with more pixels than their files justify are left
   const std::uint64_t bytes = pictures[0].size();
   REQUIRE(256 * bytes > 10'000);  // so that the bytes of one more justify its pixels, as in a file
   MeshWarnings warnings;
-  TextureLoader loader(scratch.path(), warnings, 0);
+  TextureLoader loader(scratch.path(), warnings, nullptr, 0);
   for (const char* name : {"a.png", "./a.png", "b.png", "c.png"}) CHECK(loader.load(name));
   CHECK(warnings.lines().empty());
 
   const auto decode = [&](TextureLoader& from, const std::string& name) {
-    return from.decode(name, std::as_bytes(std::span(pictures[0])), 0);
+    return from.decode(name, ByteRange(std::as_bytes(std::span(pictures[0]))), 0);
   };
-  TextureLoader poor(scratch.path(), warnings, 25'000);
+  TextureLoader poor(scratch.path(), warnings, nullptr, 25'000);
   CHECK(decode(poor, "image 0"));
   CHECK(decode(poor, "image 1"));
   CHECK_FALSE(decode(poor, "image 2"));

@@ -137,7 +137,7 @@ TEST_CASE("area light: the texture of a lamp lights as all of its parts do", "[s
   Image picture{.width = 8, .height = 8, .pixels = std::vector<glm::vec3>(64, glm::vec3(0))};
   picture.pixels[8 * 1 + 6] = {1, 0.5F, 0.25F};
   picture.pixels[8 * 6 + 1] = glm::vec3(0.25F);
-  mesh.materials[0].emission_texture = std::make_shared<const Image>(picture);
+  mesh.materials[0].emission_texture = std::make_shared<const Texture>(picture);
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
   for (const glm::dvec3 at : {glm::dvec3(0.7, 0, 0.6), glm::dvec3(-0.6, 0.8, -0.7)}) {

@@ -189,10 +189,11 @@ TEST_CASE("light rig: values that JSON cannot express are not written", "[scene]
 
 TEST_CASE("light rig: a missing map is an error, a rig without a map is not", "[scene][lights]") {
   Sky sky;
-  CHECK(load_sky_map(sky, "/") == SkyMap::none);
+  const auto store = TextureStore::make();
+  CHECK(load_sky_map(sky, "/", *store) == SkyMap::none);
   CHECK(!sky.map);
   sky.map_path = "/no-such-place/no-such-map.exr";
-  CHECK_THROWS_WITH(load_sky_map(sky, "/no-such-folder"),
+  CHECK_THROWS_WITH(load_sky_map(sky, "/no-such-folder", *store),
                     Catch::Contains("/no-such-place/no-such-map.exr") &&
                         Catch::Contains("/no-such-folder/no-such-map.exr"));
 }

@@ -274,7 +274,7 @@ TEST_CASE("sampler: a fine texture is averaged over the patch of a surfel", "[sc
   Image checks{64, 64, {}};
   for (int i = 0; i < 64 * 64; ++i)
     checks.pixels.push_back(glm::vec3((i / 64 + i) % 2 == 0 ? 1.0f : 0));
-  mesh.materials[0].texture = std::make_shared<Image>(checks);
+  mesh.materials[0].texture = std::make_shared<const Texture>(checks);
   mesh.materials[0].albedo = glm::vec3(0.8f);
   for (const glm::vec3& p : mesh.positions) mesh.uvs.emplace_back(p.x, p.z);
   double mean = 0;

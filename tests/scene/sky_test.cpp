@@ -16,9 +16,12 @@ using namespace ptc;
 
 namespace {
 
-std::shared_ptr<Image> black(unsigned width, unsigned height) {
-  return std::make_shared<Image>(
-      Image{width, height, std::vector<glm::vec3>(std::size_t{width} * height, glm::vec3(0))});
+Image black(unsigned width, unsigned height) {
+  return {width, height, std::vector<glm::vec3>(std::size_t{width} * height, glm::vec3(0))};
+}
+
+std::shared_ptr<const Texture> map_of(const Image& image) {
+  return std::make_shared<const Texture>(image);
 }
 
 void set(Image& image, unsigned x, unsigned y, const glm::vec3& value) {
@@ -63,15 +66,14 @@ glm::dvec3 integral(const Sky& sky, const glm::vec3& normal) {
 
 TEST_CASE("sky map: with +y up, columns face -z, +x, +z, -x and the top row the zenith",
           "[scene][sky]") {
-  auto map = black(8, 4);
   Sky sky;
   sky.radiance = glm::vec3(1);
-  sky.map = map;
   // Light two pixels, so that the border between them, at column x, is brightest.
   const auto brightest = [&](unsigned x, unsigned y) {
-    *map = *black(8, 4);
-    set(*map, x, y, glm::vec3(1));
-    set(*map, (x + 7) % 8, y, glm::vec3(1));
+    Image map = black(8, 4);
+    set(map, x, y, glm::vec3(1));
+    set(map, (x + 7) % 8, y, glm::vec3(1));
+    sky.map = map_of(map);
   };
   brightest(0, 1);
   CHECK(sky.at(glm::normalize(glm::vec3(0, 0.4f, -1))).x > 0.9f);
@@ -82,21 +84,22 @@ TEST_CASE("sky map: with +y up, columns face -z, +x, +z, -x and the top row the 
   CHECK(sky.at(glm::normalize(glm::vec3(0, -0.4f, 1))).x > 0.9f);
   brightest(6, 2);
   CHECK(sky.at(glm::normalize(glm::vec3(-1, -0.4f, 0))).x > 0.9f);
-  *map = *black(8, 4);
-  for (unsigned x = 0; x < 8; ++x) set(*map, x, 0, glm::vec3(x == 0 ? 2.0f : 1.0f));
+  Image map = black(8, 4);
+  for (unsigned x = 0; x < 8; ++x) set(map, x, 0, glm::vec3(x == 0 ? 2.0f : 1.0f));
+  sky.map = map_of(map);
   CHECK(sky.at({0, 1, 0}).x >= 1);
   CHECK(sky.at({0, -1, 0}).x == 0);
 }
 
 TEST_CASE("sky map: another up direction turns the map by the smallest rotation", "[scene][sky]") {
-  auto map = black(64, 32);
-  set(*map, 32, 16, glm::vec3(1));
-  set(*map, 31, 16, glm::vec3(1));
-  set(*map, 32, 15, glm::vec3(1));
-  set(*map, 31, 15, glm::vec3(1));  // the middle: looks along +z with +y up
+  Image map = black(64, 32);
+  set(map, 32, 16, glm::vec3(1));
+  set(map, 31, 16, glm::vec3(1));
+  set(map, 32, 15, glm::vec3(1));
+  set(map, 31, 15, glm::vec3(1));  // the middle: looks along +z with +y up
   Sky sky;
   sky.radiance = glm::vec3(2);
-  sky.map = map;
+  sky.map = map_of(map);
   sky.up = {0, 1, 0};
   CHECK(sky.at({0, 0, 1}).x == Approx(2));
   sky.up = {0, 0, 1};  // a turn about x: +z goes to -y
@@ -135,14 +138,14 @@ TEST_CASE("sky map: one bright pixel gives its radiance times solid angle times 
   const Mesh mesh = ground(100);
   const RayScene scene(mesh);
   for (const unsigned row : {2u, 10u, 24u, 30u}) {
-    auto map = black(128, 64);
-    set(*map, 77, row, glm::vec3(1000, 100, 0));
+    Image map = black(128, 64);
+    set(map, 77, row, glm::vec3(1000, 100, 0));
     LightRig rig;
     rig.sky.radiance = glm::vec3(1, 2, 3);
-    rig.sky.map = map;
+    rig.sky.map = map_of(map);
     const DirectLight light(scene, rig);
     const double cosine = std::cos(kPiDouble * (row + 0.5) / 64);
-    const double expected = 1000 * pixel_sr(*map, row) * cosine;
+    const double expected = 1000 * pixel_sr(map, row) * cosine;
     double mean = 0;
     double squares = 0;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
@@ -160,11 +163,11 @@ TEST_CASE("sky map: one bright pixel gives its radiance times solid angle times 
 TEST_CASE("sky map: a bright pixel below the horizon gives no light", "[scene][sky]") {
   const Mesh mesh = ground(1000);
   const RayScene scene(mesh);
-  auto map = black(64, 32);
-  set(*map, 10, 20, glm::vec3(1000));
+  Image map = black(64, 32);
+  set(map, 10, 20, glm::vec3(1000));
   LightRig rig;
   rig.sky.radiance = glm::vec3(1);
-  rig.sky.map = map;
+  rig.sky.map = map_of(map);
   CHECK(DirectLight(scene, rig).irradiance({0, 0, 0}, {0, 1, 0}, {}, 1).sky == glm::vec3(0));
 }
 
@@ -176,7 +179,7 @@ TEST_CASE("sky map: any map and any tilt give the integral of radiance times cos
   for (int i = 0; i < 6; ++i) {
     LightRig rig;
     rig.sky.radiance = {1, 0.5f, 2};
-    rig.sky.map = std::make_shared<Image>(noise(i < 4 ? 16 : 1, i % 2 == 0 ? 8 : 1, random));
+    rig.sky.map = map_of(noise(i < 4 ? 16 : 1, i % 2 == 0 ? 8 : 1, random));
     rig.sky.up = random.direction();
     const DirectLight light(scene, rig);
     const glm::vec3 normal = random.direction();
@@ -194,7 +197,7 @@ TEST_CASE("sky density: it integrates to 1, and samples follow the density that 
   Random random(3);
   Sky sky;
   sky.radiance = glm::vec3(1);
-  sky.map = std::make_shared<Image>(noise(12, 7, random));
+  sky.map = map_of(noise(12, 7, random));
   sky.up = random.direction();
   const SkyDensity density(sky);
   const int count = 200000;
@@ -211,11 +214,35 @@ TEST_CASE("sky density: it integrates to 1, and samples follow the density that 
   }
 }
 
+TEST_CASE("sky density: on a large map, pixels of one block are drawn by their own brightness",
+          "[scene][sky]") {
+  Image map = black(4096, 1024);
+  set(map, 1001, 512, glm::vec3(1));
+  set(map, 1003, 512, glm::vec3(3));
+  Sky sky;
+  sky.radiance = glm::vec3(1);
+  sky.map = map_of(map);
+  CHECK(SkyDensity::bytes(sky) == 1024 * (1024 * 4 + 16));  // blocks of four pixels
+  const SkyDensity density(sky);
+  const SkyOrientation orientation(sky.up);
+  Random random(5);
+  int first = 0, second = 0;
+  const int count = 20'000;
+  for (int i = 0; i < count; ++i) {
+    const auto sample = density.sample(glm::vec2(random.in_box(0, 0.9999999)));
+    const double column = orientation.place_of(sample.direction).x * 4096 - 0.5;
+    if (std::abs(column - 1001) < 0.999) ++first;
+    if (std::abs(column - 1003) < 0.999) ++second;
+  }
+  CHECK(first + second > 0.99 * count);
+  CHECK(first == Approx(0.25 * count).epsilon(0.05));
+}
+
 TEST_CASE("sky density: a black map gives no light and no division by zero", "[scene][sky]") {
   const Mesh mesh = ground(1);
   const RayScene scene(mesh);
   LightRig rig;
   rig.sky.radiance = glm::vec3(1);
-  rig.sky.map = black(16, 8);
+  rig.sky.map = map_of(black(16, 8));
   CHECK(DirectLight(scene, rig).irradiance({0, 0, 0}, {0, 1, 0}, {}, 1).sky == glm::vec3(0));
 }

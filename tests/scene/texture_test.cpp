@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
 #include <catch2/catch.hpp>
 
@@ -54,6 +55,7 @@ TEST_CASE("texture: unusual coordinates and empty pictures give a finite colour"
     CHECK(std::isfinite(c.x + c.y + c.z));
   }
   CHECK(sample_texture(Image{}, {0.5f, 0.5f}) == glm::vec3(1));
+  CHECK_THROWS_AS(Texture(Image{2, 2, {}}), std::invalid_argument);
 }
 
 TEST_CASE("panorama: columns wrap around and rows end", "[scene][texture]") {

@@ -10,6 +10,8 @@
 // The library reads the values of some types by the size of the type and ignores the declared one.
 // If the two differ, it takes what follows for names and sizes that were not checked here. So the
 // walk demands that they agree.
+#include "engine/io/image/exr_check.h"
+
 #include <algorithm>
 #include <array>
 #include <string>
@@ -17,7 +19,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
-#include "engine/io/image/image_formats.h"
+#include "engine/io/image/image.h"
 #include "engine/io/text/byte_stream.h"
 
 namespace ptc {

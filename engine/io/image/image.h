@@ -1,5 +1,5 @@
-// Reading and writing of pictures: EXR through OpenEXR, PNG is written through libpng, and other
-// formats are read through stb.
+// Reading and writing of whole pictures: EXR through OpenEXR, PNG through libpng, JPEG through
+// libjpeg, HDR by this program, BMP and TGA through stb.
 #pragma once
 
 #include <cstddef>

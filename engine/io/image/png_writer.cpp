@@ -1,10 +1,6 @@
 // PNG files, written row by row through libpng.
-//
-// libpng reports errors by longjmp(), which must pass no destructor. So each call of the library
-// stands in guarded(), and what it calls back notes an exception and leaves it to fail().
 #include <algorithm>
 #include <cmath>
-#include <csetjmp>
 #include <cstdint>
 #include <exception>
 #include <new>
@@ -17,6 +13,7 @@
 
 #include "engine/io/file/file.h"
 #include "engine/io/image/image.h"
+#include "engine/io/image/png_guard.h"
 #include "engine/io/image/srgb.h"
 
 namespace ptc {
@@ -29,39 +26,33 @@ std::uint8_t stored_8_bit(float linear) {
 
 }  // namespace
 
-struct PngWriter::State {
+struct PngWriter::State : PngGuard {
   unsigned width, height;
   OutputFile file;
-  png_structp png = nullptr;
   png_infop info = nullptr;
   unsigned written = 0;           // rows
   std::vector<std::uint8_t> row;  // as stored
-  std::exception_ptr failure;     // of the file
-  std::string message;            // of the library
 
   State(const std::filesystem::path& target, unsigned columns, unsigned rows)
       : width(columns), height(rows), file(target), row(std::size_t{3} * columns) {
-    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, this, note, ignore);
-    info = png == nullptr ? nullptr : png_create_info_struct(png);
+    png_ =
+        png_create_write_struct(PNG_LIBPNG_VER_STRING, static_cast<PngGuard*>(this), note, ignore);
+    info = png_ == nullptr ? nullptr : png_create_info_struct(png_);
     if (info == nullptr) {
-      png_destroy_write_struct(&png, &info);
+      png_destroy_write_struct(&png_, &info);
       throw std::bad_alloc();
     }
   }
-  ~State() { png_destroy_write_struct(&png, &info); }
+  ~State() override { png_destroy_write_struct(&png_, &info); }
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  // Lets the library do something. @throws std::system_error of the file; std::runtime_error
-  template <typename Step>
-  void guarded(const Step& step) {
-    if (setjmp(png_jmpbuf(png)) != 0) fail();
-    step();
-  }
+  using PngGuard::guarded;
+  [[nodiscard]] png_structp png() const noexcept { return png_; }
 
-  [[noreturn]] void fail() const {
-    if (failure) std::rethrow_exception(failure);
-    throw std::runtime_error(file.target().string() + ": libpng: " + message);
+  [[noreturn]] void fail() const override {
+    if (failure_) std::rethrow_exception(failure_);
+    throw std::runtime_error(file.target().string() + ": libpng: " + message_);
   }
 
   static void append(png_structp png, png_bytep bytes, std::size_t count) {
@@ -69,19 +60,11 @@ struct PngWriter::State {
     try {
       state.file.append(std::as_bytes(std::span(bytes, count)));
     } catch (...) {
-      state.failure = std::current_exception();
+      state.failure_ = std::current_exception();
     }
-    if (state.failure) png_error(png, "the file cannot be written");
+    if (state.failure_) png_error(png, "the file cannot be written");
   }
   static void flush(png_structp /*png*/) {}
-  static void note(png_structp png, png_const_charp text) {
-    try {
-      static_cast<State*>(png_get_error_ptr(png))->message = text;
-    } catch (const std::bad_alloc&) {  // the message stays empty
-    }
-    png_longjmp(png, 1);
-  }
-  static void ignore(png_structp /*png*/, png_const_charp /*text*/) {}
 };
 
 PngWriter::PngWriter(const std::filesystem::path& target, unsigned width, unsigned height) {
@@ -91,10 +74,10 @@ PngWriter::PngWriter(const std::filesystem::path& target, unsigned width, unsign
   state_ = std::make_unique<State>(target, width, height);
   State& s = *state_;
   s.guarded([&s] {
-    png_set_write_fn(s.png, &s, State::append, State::flush);
-    png_set_IHDR(s.png, s.info, s.width, s.height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+    png_set_write_fn(s.png(), &s, State::append, State::flush);
+    png_set_IHDR(s.png(), s.info, s.width, s.height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                  PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    png_write_info(s.png, s.info);
+    png_write_info(s.png(), s.info);
   });
 }
 
@@ -110,14 +93,14 @@ void PngWriter::write(std::span<const glm::vec3> pixels) {
       for (std::size_t c = 0; c < 3; ++c)
         s.row[3 * x + c] = stored_8_bit(pixels[x][static_cast<int>(c)]);
     }
-    s.guarded([&s] { png_write_row(s.png, s.row.data()); });
+    s.guarded([&s] { png_write_row(s.png(), s.row.data()); });
   }
 }
 
 void PngWriter::publish() {
   State& s = *state_;
   if (s.written != s.height) throw std::invalid_argument("PngWriter: rows are missing");
-  s.guarded([&s] { png_write_end(s.png, s.info); });
+  s.guarded([&s] { png_write_end(s.png(), s.info); });
   s.file.publish();
 }
 

@@ -381,11 +381,11 @@ GltfDocument::View GltfDocument::find_view(std::uint64_t index) {
   return view;
 }
 
-std::vector<std::byte> GltfDocument::view(std::uint64_t index) {
+ByteRange GltfDocument::view(std::uint64_t index) {
   const View view = find_view(index);
-  std::vector<std::byte> bytes(view.length);
-  buffer(view.buffer).read(view.offset, bytes);
-  return bytes;
+  const Buffer& holder = buffer(view.buffer);
+  if (holder.file) return {*holder.file, holder.offset + view.offset, view.length};
+  return ByteRange(std::span(holder.held).subspan(view.offset, view.length));
 }
 
 GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::size_t components,

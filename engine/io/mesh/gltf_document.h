@@ -21,6 +21,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/io/file/file.h"
+#include "engine/io/image/byte_range.h"
 
 namespace ptc {
 
@@ -61,9 +62,9 @@ class GltfDocument {
   [[nodiscard]] std::optional<std::array<double, N>> numbers_at(const Json& object,
                                                                 const char* key) const;
 
-  /// Reads the bytes of bufferViews[index].
+  /// Finds the bytes of bufferViews[index], which are valid as long as this document.
   /// @throws DataError when the view does not exist or lies outside its buffer; std::system_error
-  [[nodiscard]] std::vector<std::byte> view(std::uint64_t index);
+  [[nodiscard]] ByteRange view(std::uint64_t index);
   /// Returns the bytes of a data URI. @throws DataError
   [[nodiscard]] std::vector<std::byte> decode_uri(const std::string& uri) const;
   /// Returns the file name for which a URI stands; escapes such as %20 are resolved.

@@ -16,20 +16,20 @@
 #include <glm/vec3.hpp>
 
 #include "engine/base/surfel.h"
-#include "engine/io/image/image.h"
+#include "engine/io/image/texture.h"
 
 namespace ptc {
 
 /// A material: diffuse reflectance and emission of a set of triangles.
 struct Material {
-  std::string name;                      ///< as the file has it; may be empty
-  glm::vec3 albedo{0.5f};                ///< linear RGB; multiplied by the texture if there is one
-  std::shared_ptr<const Image> texture;  ///< linear RGB, row 0 at the top, repeats; may be null
+  std::string name;        ///< as the file has it; may be empty
+  glm::vec3 albedo{0.5f};  ///< linear RGB; multiplied by the texture if there is one
+  std::shared_ptr<const Texture> texture;  ///< linear RGB, row 0 at the top, repeats; may be null
   /// Radiance of the front side, RGB, W / (m^2 sr); multiplied by `emission_texture` if there is
   /// one.
   glm::vec3 emission{0};
-  std::shared_ptr<const Image> emission_texture;  ///< as `texture`
-  bool double_sided = false;                      ///< the back reflects as the front does (glTF)
+  std::shared_ptr<const Texture> emission_texture;  ///< as `texture`
+  bool double_sided = false;                        ///< the back reflects as the front does (glTF)
 };
 
 /// The maximum number of materials of a mesh.
@@ -70,6 +70,8 @@ struct MeshRoom {
   std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max();
   /// Directory of temporary files for a mesh that takes more.
   std::filesystem::path temp_directory = ".";
+  /// Reads the textures; null: they stay in memory.
+  std::shared_ptr<TextureStore> textures;
 };
 
 /// The content of a mesh file.

@@ -84,7 +84,7 @@ class GltfMesh {
       : document_(path, room.memory_bytes),
         soup_(path, {room.memory_bytes - std::min(room.memory_bytes, document_.json_bytes()),
                      room.temp_directory}),
-        textures_(path.parent_path(), warnings_) {}
+        textures_(path.parent_path(), warnings_, room.textures) {}
 
   MeshFile read() {
     check_extensions();
@@ -379,16 +379,18 @@ class GltfMesh {
   }
 
   // Returns the mean of a texture; it is kept, because many materials may share one.
-  glm::dvec3 mean_of(const std::shared_ptr<const Image>& image) {
+  glm::dvec3 mean_of(const std::shared_ptr<const Texture>& image) {
     const auto [at, is_new] = means_.try_emplace(image, 0);
     if (is_new) {
-      for (const glm::vec3& pixel : image->pixels) at->second += glm::dvec3(pixel);
-      at->second /= static_cast<double>(image->pixels.size());
+      image->visit_rows([&sum = at->second](std::span<const glm::vec3> row) {
+        for (const glm::vec3& pixel : row) sum += glm::dvec3(pixel);
+      });
+      at->second /= static_cast<double>(image->size());
     }
     return at->second;
   }
 
-  std::shared_ptr<const Image> load_texture(const Json& info) {
+  std::shared_ptr<const Texture> load_texture(const Json& info) {
     const auto texture = document_.unsigned_at(info, "index");
     if (!texture) document_.fail("a texture has no index");
     const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
@@ -405,20 +407,21 @@ class GltfMesh {
   }
 
   // Loads an image. Several images that are one file or one bufferView are loaded once.
-  std::shared_ptr<const Image> load_image(std::uint64_t source) {
+  std::shared_ptr<const Texture> load_image(std::uint64_t source) {
     const Json& image = document_.at("images", source);
     const auto uri = image.find("uri");
     const std::string label = "image " + std::to_string(source);
     if (uri != image.end() && uri->is_string()) {
       const std::string text = uri->get<std::string>();
       if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
-      return textures_.decode(label, document_.decode_uri(text), document_.bytes_read());
+      const std::vector<std::byte> bytes = document_.decode_uri(text);
+      return textures_.decode(label, ByteRange(bytes), document_.bytes_read());
     }
     const auto view = document_.unsigned_at(image, "bufferView");
     if (!view) document_.fail("an image has neither uri nor bufferView");
     const auto [at, is_new] = image_of_view_.try_emplace(*view);
     if (is_new) {
-      const std::vector<std::byte> bytes = document_.view(*view);
+      const ByteRange bytes = document_.view(*view);
       at->second = textures_.decode(label, bytes, document_.bytes_read());
     }
     return at->second;
@@ -445,10 +448,10 @@ class GltfMesh {
   std::vector<MeshCamera> cameras_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::map<std::uint64_t, GltfMaterial> materials_;                      // by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Image>> images_;         // by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Image>> image_of_view_;  // by index of bufferView
-  std::map<std::shared_ptr<const Image>, glm::dvec3> means_;
+  std::map<std::uint64_t, GltfMaterial> materials_;                        // by index in the file
+  std::map<std::uint64_t, std::shared_ptr<const Texture>> images_;         // by index in the file
+  std::map<std::uint64_t, std::shared_ptr<const Texture>> image_of_view_;  // by index of bufferView
+  std::map<std::shared_ptr<const Texture>, glm::dvec3> means_;
   std::set<std::uint64_t> textures_left_out_;  // indices in the file
   std::set<std::uint64_t> cameras_left_out_;   // indices in the file
   std::vector<bool> visited_;                  // per node

@@ -29,7 +29,10 @@ using Corner = MeshSoup::Corner;
 class ObjMesh {
  public:
   ObjMesh(const std::filesystem::path& path, const MeshRoom& room)
-      : path_(path), stream_(path), soup_(path, room), textures_(path.parent_path(), warnings_) {}
+      : path_(path),
+        stream_(path),
+        soup_(path, room),
+        textures_(path.parent_path(), warnings_, room.textures) {}
 
   MeshFile read() {
     std::string_view line;

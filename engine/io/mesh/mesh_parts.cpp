@@ -54,36 +54,38 @@ std::uint64_t TextureLoader::pixels_left() const {
   return std::min(most - pixels_, kMaxImagePixels);
 }
 
-std::shared_ptr<const Image> TextureLoader::keep(Image image) {
-  pixels_ += image.pixels.size();
-  return std::make_shared<const Image>(std::move(image));
+std::shared_ptr<const Texture> TextureLoader::keep(Texture texture) {
+  pixels_ += texture.size();
+  return std::make_shared<const Texture>(std::move(texture));
 }
 
-std::shared_ptr<const Image> TextureLoader::load(const std::string& name) {
+std::shared_ptr<const Texture> TextureLoader::load(const std::string& name) {
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
   // Normalise the name, because one file has many: a.png and ./a.png.
   const std::filesystem::path path = (directory_ / relative).lexically_normal();
   const auto known = loaded_.find(path.string());
   if (known != loaded_.end()) return known->second;
-  std::shared_ptr<const Image> image;
+  std::shared_ptr<const Texture> texture;
   try {
     texture_bytes_ += InputFile(path).size();
-    image = keep(read_image(path, pixels_left()));
+    texture = keep(store_->read(path, pixels_left()));
   } catch (const std::bad_alloc&) {
+    throw;
+  } catch (const LimitError&) {
     throw;
   } catch (const std::exception& error) {
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
-  return loaded_[path.string()] = std::move(image);
+  return loaded_[path.string()] = std::move(texture);
 }
 
-std::shared_ptr<const Image> TextureLoader::decode(const std::string& name,
-                                                   std::span<const std::byte> bytes,
-                                                   std::uint64_t mesh_bytes) {
+std::shared_ptr<const Texture> TextureLoader::decode(const std::string& name,
+                                                     const ByteRange& bytes,
+                                                     std::uint64_t mesh_bytes) {
   mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
   try {
-    return keep(decode_image(bytes, name, pixels_left()));
+    return keep(store_->read(bytes, name, pixels_left()));
   } catch (const DataError& error) {
     warnings_.add(kTextureLeftOut, error.what());
     return nullptr;

@@ -169,34 +169,41 @@ class TextureLoader {
   /// Makes a loader for one mesh.
   /// @param directory  directory of the mesh file, to which names of textures are relative
   /// @param warnings   receives the failures; must outlive this loader
+  /// @param store      reads the textures; null: they stay in memory
   TextureLoader(std::filesystem::path directory, MeshWarnings& warnings,
-                std::uint64_t free_pixels = kMaxImagePixels)
-      : directory_(std::move(directory)), warnings_(warnings), free_pixels_(free_pixels) {}
+                std::shared_ptr<TextureStore> store, std::uint64_t free_pixels = kMaxImagePixels)
+      : directory_(std::move(directory)),
+        warnings_(warnings),
+        store_(store ? std::move(store) : TextureStore::make()),
+        free_pixels_(free_pixels) {}
 
   /// Returns the texture in a file, or null after a warning.
   /// @param name  path relative to the directory, with / or \ between its parts
-  [[nodiscard]] std::shared_ptr<const Image> load(const std::string& name);
+  /// @throws LimitError when the texture takes more memory to decode than it may
+  [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name);
   /// Decodes a texture in bytes of the mesh's own files, or returns null after a warning. Unlike
   /// load(), each call makes a texture of its own.
   /// @param name        name of the texture, for the warning
   /// @param mesh_bytes  size of these files as far as they were read, bytes
-  [[nodiscard]] std::shared_ptr<const Image> decode(const std::string& name,
-                                                    std::span<const std::byte> bytes,
-                                                    std::uint64_t mesh_bytes);
+  /// @throws as load()
+  [[nodiscard]] std::shared_ptr<const Texture> decode(const std::string& name,
+                                                      const ByteRange& bytes,
+                                                      std::uint64_t mesh_bytes);
 
  private:
   /// Returns the number of pixels that the next texture may have.
   [[nodiscard]] std::uint64_t pixels_left() const;
   /// Counts the pixels of a texture and puts it on the heap.
-  std::shared_ptr<const Image> keep(Image image);
+  std::shared_ptr<const Texture> keep(Texture texture);
 
   std::filesystem::path directory_;
   MeshWarnings& warnings_;
+  std::shared_ptr<TextureStore> store_;
   std::uint64_t free_pixels_;
   std::uint64_t pixels_ = 0;         // of all textures so far
   std::uint64_t texture_bytes_ = 0;  // size of the files that load() read
   std::uint64_t mesh_bytes_ = 0;     // size of the mesh's own files
-  std::map<std::string, std::shared_ptr<const Image>> loaded_;
+  std::map<std::string, std::shared_ptr<const Texture>> loaded_;
 };
 
 // The readers of each format, as read_mesh() describes them.

@@ -168,7 +168,8 @@ class Build {
     check_extensible(*scene_);
     // Keep the lights of the scene; without meshes to light, their sky picture is not loaded
     if (scene_->meta().text.contains(kLightsKey)) {
-      request_.lights = has_meshes() ? recorded_lights(*scene_, progress_) : LightRig{};
+      request_.lights =
+          has_meshes() ? recorded_lights(*scene_, *sky_store(), progress_) : LightRig{};
     }
   }
 
@@ -202,8 +203,14 @@ class Build {
     return points / points_per_page(header) * (8 + 5 * groups) / 5;
   }
 
+  [[nodiscard]] std::shared_ptr<TextureStore> sky_store() const {
+    return texture_store(request_.run, target_);
+  }
+
   [[nodiscard]] MemoryBudget build_budget() const {
-    return budget_of(request_.run.memory_bytes, "this scene's build");
+    MemoryBudget budget = budget_of(request_.run.memory_bytes, "this scene's build");
+    if (request_.lights) charge_sky(budget, request_.lights->sky);
+    return budget;
   }
 
   /// Returns the memory for meshes. While they are read, nothing else takes any.
@@ -217,6 +224,7 @@ class Build {
     return {.reading = std::max(budget.left(), kLeast),
             .kept = room,
             .traced = std::max(sampling_room(budget, sampling), kLeast),
+            .textures = request_.run.memory_bytes / 4,
             .temp_directory = roomiest_temp_dir(request_.run, target_)};
   }
 
@@ -314,6 +322,7 @@ class Build {
     // Charge the inputs to the memory cap
     SamplingRoom room;
     MemoryBudget budget = build_budget();
+    if (!request_.lights) charge_sky(budget, inputs.lights.sky);
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
       charge_mesh(budget, lit->mesh, &lit->rays);
@@ -388,7 +397,7 @@ class Build {
                      " light all points; give lights to light them otherwise");
     }
     // The picture of a scene's sky is not loaded where no mesh needs it
-    if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, progress_);
+    if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, *sky_store(), progress_);
     unlit_path_ = temporary_container_path(roomiest_temp_dir(request_.run, target_));
     unlit_ = std::make_unique<TemporaryName>(unlit_path_);
     if (scene_) {

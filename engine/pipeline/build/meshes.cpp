@@ -64,7 +64,7 @@ class Joiner {
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
     const std::uint64_t kept = left(limits_.kept);
     return {std::min(left(limits_.reading), kept > kMost / 4 ? kMost : 4 * kept),
-            limits_.temp_directory};
+            limits_.temp_directory, textures_};
   }
 
   void add(Mesh mesh) {
@@ -117,6 +117,8 @@ class Joiner {
   }
 
   MeshLimits limits_;
+  std::shared_ptr<TextureStore> textures_ =
+      TextureStore::make(limits_.textures, limits_.temp_directory);
   const char* field_;
   std::vector<std::pair<Mesh, std::shared_ptr<const SpilledMesh>>> meshes_;
   bool spilled_ = false;

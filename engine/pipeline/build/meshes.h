@@ -21,6 +21,8 @@ struct MeshLimits {
   std::uint64_t kept = std::numeric_limits<std::uint64_t>::max();
   /// Cap of the meshes and of what rays at them and their sampling need, bytes.
   std::uint64_t traced = std::numeric_limits<std::uint64_t>::max();
+  /// Cap of the textures, as a TextureStore takes it, bytes.
+  std::uint64_t textures = std::numeric_limits<std::uint64_t>::max();
   std::filesystem::path temp_directory = ".";
 };
 

@@ -214,8 +214,9 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   // Open the scene, and choose the lights
   LightReport report;
   const ContainerReader scene(with_directory_under(request.scene, request.run));
+  const auto store = texture_store(request.run, target);
   const LightRig rig =
-      normalised(request.lights ? *request.lights : recorded_lights(scene, progress));
+      normalised(request.lights ? *request.lights : recorded_lights(scene, *store, progress));
   const Meta planned = lit_meta(scene, rig, true);
   check_scene(scene, planned);
   if (planned.channels.size() < scene.meta().channels.size())
@@ -243,6 +244,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   const auto cache_bytes_with = [&](unsigned threads) {
     MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
     budget.charge("emitters", 160 * report.emitters);
+    charge_sky(budget, rig.sky);
     budget.charge(
         "the output's directory",
         ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads) +

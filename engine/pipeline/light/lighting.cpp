@@ -143,6 +143,7 @@ Lighting::~Lighting() = default;
 void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
                        const glm::dvec3& eye, const std::filesystem::path& target) {
   charge_bounces(budget, scene_, request_.bounces, executor_.threads());
+  charge_sky(budget, sky);
   if (request_.glossy.roughness) {
     mirrors_ = {.eye = eye,
                 .roughness = *request_.glossy.roughness,

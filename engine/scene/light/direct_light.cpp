@@ -48,7 +48,7 @@ DirectLight::DirectLight(const RayScene& scene, LightRig rig)
       rays_(normalised(std::move(rig)), emitters_of(scene.mesh()), scene.mesh().origin,
             scene.epsilon()) {
   const Sky& sky = rays_.rig().sky;
-  if (sky.map && !sky.map->pixels.empty() && is_lit(sky.radiance)) sky_density_.emplace(sky);
+  if (sky.map && sky.map->size() > 0 && is_lit(sky.radiance)) sky_density_.emplace(sky);
   sky_is_black_ = !is_lit(sky.radiance) || (sky_density_ && sky_density_->is_black());
 }
 

@@ -57,8 +57,8 @@ class Cutter {
   [[nodiscard]] double texels(const SubTriangle& part) const {
     const glm::dvec2 a(on_texture(part.uv[0])), b = glm::dvec2(on_texture(part.uv[1])) - a,
                                                 c = glm::dvec2(on_texture(part.uv[2])) - a;
-    const Image& image = *material_.emission_texture;
-    const double area = 0.5 * std::abs(b.x * c.y - b.y * c.x) * image.width * image.height;
+    const Texture& image = *material_.emission_texture;
+    const double area = 0.5 * std::abs(b.x * c.y - b.y * c.x) * image.width() * image.height();
     return std::isfinite(area) ? area : 0;
   }
 
@@ -111,9 +111,11 @@ class Cutter {
 };
 
 /// Returns the largest value of each channel.
-glm::vec3 brightest(const Image& image) {
+glm::vec3 brightest(const Texture& image) {
   glm::vec3 most(0);
-  for (const glm::vec3& pixel : image.pixels) most = glm::max(most, pixel);
+  image.visit_rows([&most](std::span<const glm::vec3> row) {
+    for (const glm::vec3& pixel : row) most = glm::max(most, pixel);
+  });
   return most;
 }
 

@@ -206,12 +206,13 @@ LightRig light_rig_from_json(const std::string& text) {
 }
 
 // Seeds the digest with the size, so that pictures of other proportions differ.
-std::uint64_t image_xxh3(const Image& image) {
-  const std::uint64_t seed = std::uint64_t{image.width} << 32 | image.height;
-  return std::max<std::uint64_t>(1, xxh3_64(std::as_bytes(std::span(image.pixels)), seed));
+std::uint64_t image_xxh3(const Texture& image) {
+  Xxh3 digest(std::uint64_t{image.width()} << 32 | image.height());
+  image.visit_rows([&digest](std::span<const glm::vec3> row) { digest.add(std::as_bytes(row)); });
+  return std::max<std::uint64_t>(1, digest.value());
 }
 
-SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
+SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory, TextureStore& store) {
   // Find the file: where it was recorded, else in the given directory.
   if (sky.map_path.empty()) return SkyMap::none;
   const std::filesystem::path recorded(sky.map_path);
@@ -226,7 +227,7 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory) {
                     ": put it there, or give a sky to what shades the scene or lights it anew");
   }
   // Read it, and compare its digest with the recorded one.
-  sky.map = std::make_shared<const Image>(read_image(is_there ? recorded : beside));
+  sky.map = std::make_shared<const Texture>(store.read(is_there ? recorded : beside));
   const bool same = sky.map_xxh3 == 0 || sky.map_xxh3 == image_xxh3(*sky.map);
   return same ? SkyMap::same : SkyMap::changed;
 }

@@ -110,10 +110,6 @@ void check_sky(const Sky& sky, const char* field) {
                   "the upward direction of the sky is zero or not finite");
   require_request(is_light(sky.radiance), field,
                   "the radiance of the sky is negative or not finite");
-  if (const Image* map = sky.map.get()) {
-    require_request(map->pixels.size() == std::size_t{map->width} * map->height, field,
-                    "the picture of the sky has another number of pixels than its size says");
-  }
 }
 
 void check_lights(const LightRig& rig) {

@@ -11,7 +11,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "engine/io/image/image.h"
+#include "engine/io/image/texture.h"
 
 namespace ptc {
 
@@ -74,8 +74,8 @@ struct SpotLight {
 /// for -y). Between pixel centres the radiance is bilinear, also across the map's left and right
 /// border.
 struct Sky {
-  glm::vec3 radiance{0};             ///< W/(m^2 sr); multiplies the map where there is one
-  std::shared_ptr<const Image> map;  ///< null: `radiance` arrives from every direction
+  glm::vec3 radiance{0};               ///< W/(m^2 sr); multiplies the map where there is one
+  std::shared_ptr<const Texture> map;  ///< null: `radiance` arrives from every direction
   /// The file of the map. A container records it as an absolute path, so that programs find the map
   /// again.
   std::string map_path;
@@ -161,7 +161,7 @@ void check_lights(const LightRig& rig);
 [[nodiscard]] LightRig light_rig_from_json(const std::string& text);
 
 /// Returns the XXH3 of the size and the pixels of an image; never 0.
-[[nodiscard]] std::uint64_t image_xxh3(const Image& image);
+[[nodiscard]] std::uint64_t image_xxh3(const Texture& image);
 
 /// The state of the map of a recorded sky, as load_sky_map() found it.
 enum class SkyMap {
@@ -173,8 +173,9 @@ enum class SkyMap {
 /// Reads the picture that `sky.map_path` names, if any. Where that file does not exist, a file of
 /// the same name in `directory` takes its place.
 /// @param directory  the directory of the container that holds the record
-/// @throws DataError when neither file exists, or read_image() refuses it; std::system_error
-SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory);
+/// @param store      into which the picture is read
+/// @throws DataError when neither file exists; as TextureStore::read()
+SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory, TextureStore& store);
 
 /// Numbers of shadow rays for one surface point; 0 leaves the lights of that kind out.
 struct LightSampling {

@@ -6,7 +6,9 @@
 //     weight of a pixel = brightness x sine of its row's polar angle (its solid angle)
 //
 //     rows_      |--0--|----1----|-2-|--3--|   the second coordinate of the square times the total
-//     columns_   |-0-|------1------|2|         the first coordinate, among the pixels of that row
+//     blocks_    |-0-|------1------|2|         the first coordinate, among the blocks of that row
+//     pixels     |0|-1-|--2--|                 the rest of it, among the pixels of that block,
+//                                              whose shares are summed up anew
 //     tent          /\                         the rest of each, spread over two pixels' widths
 //                  /  \                        as bilinear interpolation spreads the pixel
 //              -1   0   1  pixels
@@ -16,6 +18,7 @@
 #include "engine/scene/light/sky_map.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -27,8 +30,11 @@
 namespace ptc {
 namespace {
 
+constexpr unsigned kWidestBlock = Texture::kTileWidth;  // which lies in one tile on the disk
+constexpr std::uint64_t kMostBlocks = 1 << 20;          // if they need not be wider
+
 bool has_map(const Sky& sky) {
-  return sky.map && !sky.map->pixels.empty();
+  return sky.map && sky.map->size() > 0;
 }
 
 // Returns the sum of the channels; what is negative or not finite counts as black.
@@ -44,15 +50,9 @@ double tent(double unit) {
   return unit < 0.5 ? std::sqrt(2 * unit) - 1 : 1 - std::sqrt(2 - 2 * unit);
 }
 
-// An interval in a list of cumulated shares.
-struct Found {
-  std::size_t index;  // of the interval
-  double within;      // where in it the value lies, in [0, 1]
-};
-
 // Finds the interval that holds a value; one without width counts as hit in its middle.
 template <typename Iterator>
-Found find_share(Iterator first, Iterator last, double value) {
+SkyDensity::Found find_share(Iterator first, Iterator last, double value) {
   const auto at = std::min(std::upper_bound(first, last, value), last - 1);
   const double begin = at == first ? 0 : static_cast<double>(*(at - 1));
   const double width = static_cast<double>(*at) - begin;
@@ -93,23 +93,43 @@ glm::vec3 SkyOrientation::direction_at(const glm::dvec2& place) const {
 glm::vec3 Sky::at(const glm::vec3& direction) const {
   if (!has_map(*this)) return radiance;
   const glm::dvec2 place = SkyOrientation(up).place_of(direction);
-  return radiance * sample_panorama(*map, place.x * map->width, place.y * map->height);
+  return radiance * sample_panorama(*map, place.x * map->width(), place.y * map->height());
 }
 
-SkyDensity::SkyDensity(const Sky& sky) : orientation_(sky.up), map_(sky.map) {
-  rows_.reserve(map_->height);
-  columns_.reserve(map_->pixels.size());
+SkyDensity::SkyDensity(const Sky& sky)
+    : orientation_(sky.up),
+      map_(sky.map),
+      width_(map_->width()),
+      height_(map_->height()),
+      block_(block_of(*map_)),
+      blocks_of_row_((width_ + block_ - 1) / block_) {
+  rows_.reserve(height_);
+  blocks_.reserve(std::size_t{blocks_of_row_} * height_);
   double total = 0;
-  std::vector<double> sums(map_->width);
-  for (unsigned row = 0; row < map_->height; ++row) {
-    sines_.push_back(std::sin(kPiDouble * (row + 0.5) / map_->height));
+  std::vector<double> sums(blocks_of_row_);
+  map_->visit_rows([&](std::span<const glm::vec3> row) {
+    const double sine = sines_.emplace_back(
+        std::sin(kPiDouble * (static_cast<double>(sines_.size()) + 0.5) / height_));
     double sum = 0;
-    for (unsigned column = 0; column < map_->width; ++column) {
-      sums[column] = sum += weight(column, row);
+    for (unsigned column = 0; column < width_; ++column) {
+      sums[column / block_] = sum += brightness(row[column]) * sine;
     }
-    for (const double part : sums) columns_.push_back(static_cast<float>(sum > 0 ? part / sum : 0));
+    for (const double part : sums) blocks_.push_back(static_cast<float>(sum > 0 ? part / sum : 0));
     rows_.push_back(total += sum);
-  }
+  });
+}
+
+unsigned SkyDensity::block_of(const Texture& map) noexcept {
+  unsigned block = 1;
+  while (block < kWidestBlock && map.size() / block > kMostBlocks) block *= 2;
+  return block;
+}
+
+std::uint64_t SkyDensity::bytes(const Sky& sky) noexcept {
+  if (!has_map(sky)) return 0;
+  const unsigned block = block_of(*sky.map);
+  const std::uint64_t blocks = (sky.map->width() + block - 1) / block;
+  return sky.map->height() * (blocks * sizeof(float) + 2 * sizeof(double));
 }
 
 double SkyDensity::weight(unsigned column, unsigned row) const {
@@ -121,13 +141,13 @@ double SkyDensity::weight(unsigned column, unsigned row) const {
 // angle makes it a density over solid angle.
 float SkyDensity::density_at(const glm::dvec2& place) const {
   // Find the four pixels around the place: columns wrap around, rows end.
-  const double x = place.x * map_->width - 0.5;
-  const double y = place.y * map_->height - 0.5;
+  const double x = place.x * width_ - 0.5;
+  const double y = place.y * height_ - 0.5;
   const double share_x = x - std::floor(x);
   const double share_y = y - std::floor(y);
-  const auto column = static_cast<unsigned>(std::floor(x) + map_->width) % map_->width;
-  const unsigned next = (column + 1) % map_->width;
-  const double most = map_->height - 1.0;
+  const auto column = static_cast<unsigned>(std::floor(x) + width_) % width_;
+  const unsigned next = (column + 1) % width_;
+  const double most = height_ - 1.0;
   const auto upper = static_cast<unsigned>(std::clamp(std::floor(y), 0.0, most));
   const auto lower = static_cast<unsigned>(std::clamp(std::floor(y) + 1, 0.0, most));
   // Blend their weights.
@@ -135,21 +155,34 @@ float SkyDensity::density_at(const glm::dvec2& place) const {
       (1 - share_y) * ((1 - share_x) * weight(column, upper) + share_x * weight(next, upper)) +
       share_y * ((1 - share_x) * weight(column, lower) + share_x * weight(next, lower));
   const double sine = std::max(std::sin(kPiDouble * place.y), 1e-9);
-  return static_cast<float>(value / rows_.back() * map_->width * map_->height /
+  return static_cast<float>(value / rows_.back() * width_ * height_ /
                             (2 * kPiDouble * kPiDouble * sine));
+}
+
+SkyDensity::Found SkyDensity::find_in_block(unsigned begin, unsigned row, double share) const {
+  if (block_ == 1) return {0, share};
+  std::array<glm::vec3, kWidestBlock> pixels;
+  const std::size_t count = std::min(block_, width_ - begin);
+  map_->read(begin, row, std::span(pixels).first(count));
+  std::array<double, kWidestBlock> sums{};
+  double sum = 0;
+  for (std::size_t i = 0; i < count; ++i) sums[i] = sum += brightness(pixels[i]);
+  return find_share(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(count), share * sum);
 }
 
 SkyDensity::Sample SkyDensity::sample(const glm::vec2& square) const {
   const Found row =
       find_share(rows_.begin(), rows_.end(), static_cast<double>(square.y) * rows_.back());
-  const auto first = columns_.begin() + static_cast<std::ptrdiff_t>(row.index * map_->width);
-  const Found column = find_share(first, first + map_->width, static_cast<double>(square.x));
-  const double x = static_cast<double>(column.index) + 0.5 + tent(column.within);
+  const auto first = blocks_.begin() + static_cast<std::ptrdiff_t>(row.index * blocks_of_row_);
+  const Found block = find_share(first, first + blocks_of_row_, static_cast<double>(square.x));
+  const auto begin = static_cast<unsigned>(block.index) * block_;
+  const Found column = find_in_block(begin, static_cast<unsigned>(row.index), block.within);
+  const double x = begin + static_cast<double>(column.index) + 0.5 + tent(column.within);
   const double y = static_cast<double>(row.index) + 0.5 + tent(row.within);
   // Bring the place back onto the map: columns wrap around, and beyond the first and the last row
   // the map goes on as it is there.
-  const double turn = x / map_->width - std::floor(x / map_->width);
-  const double rise = std::abs(y) / map_->height;
+  const double turn = x / width_ - std::floor(x / width_);
+  const double rise = std::abs(y) / height_;
   const glm::dvec2 place(turn < 1 ? turn : 0, rise > 1 ? 2 - rise : rise);
   return {orientation_.direction_at(place), density_at(place)};
 }

@@ -35,13 +35,22 @@ class SkyOrientation {
 
 /// Draws directions with a density that follows the brightness of a map, interpolated as the map
 /// itself is.
-/// Memory: 4 bytes for each pixel.   Threads: const members may be called concurrently.
+/// Memory: bytes().   Threads: const members may be called concurrently.
 class SkyDensity {
  public:
   /// Sums up the brightness of a sky's map.
   /// @param sky  has a map with pixels
   explicit SkyDensity(const Sky& sky);
 
+  /// Returns the memory of the density of a sky, bytes: at most some 4 MiB, or an eighth of a byte
+  /// for each pixel.
+  [[nodiscard]] static std::uint64_t bytes(const Sky& sky) noexcept;
+
+  /// An interval in a list of cumulated shares.
+  struct Found {
+    std::size_t index;  ///< of the interval
+    double within;      ///< where in it the value lies, in [0, 1]
+  };
   /// A direction and the density that it was drawn with.
   struct Sample {
     glm::vec3 direction{0};  ///< unit
@@ -55,17 +64,26 @@ class SkyDensity {
   [[nodiscard]] bool is_black() const noexcept { return !(rows_.back() > 0); }
 
  private:
+  /// Returns the number of pixels of a block: the fewest that give not too many blocks.
+  [[nodiscard]] static unsigned block_of(const Texture& map) noexcept;
+
   /// Returns the weight of a pixel: its brightness times the solid angle of a pixel of its row, up
   /// to a factor.
   [[nodiscard]] double weight(unsigned column, unsigned row) const;
+  /// Finds the pixel of a block that holds a share of its weight.
+  /// @param begin  column of the block's first pixel
+  [[nodiscard]] Found find_in_block(unsigned begin, unsigned row, double share) const;
   /// Returns the density at a place of the map, per steradian.
   [[nodiscard]] float density_at(const glm::dvec2& place) const;
 
   SkyOrientation orientation_;
-  std::shared_ptr<const Image> map_;
-  std::vector<double> sines_;   ///< sine of the polar angle at the middle of each row
-  std::vector<double> rows_;    ///< weight of all rows up to and including each
-  std::vector<float> columns_;  ///< within each row, the share up to and including each pixel
+  std::shared_ptr<const Texture> map_;
+  unsigned width_, height_;    ///< of the map, pixels
+  unsigned block_;             ///< pixels of a block
+  unsigned blocks_of_row_;     ///< the last may be narrower
+  std::vector<double> sines_;  ///< sine of the polar angle at the middle of each row
+  std::vector<double> rows_;   ///< weight of all rows up to and including each
+  std::vector<float> blocks_;  ///< within each row, the share up to and including each block
 };
 
 }  // namespace ptc

@@ -95,14 +95,17 @@ std::uint64_t bytes_of(const Mesh& mesh) noexcept {
 }
 
 std::uint64_t texture_bytes(const std::vector<Material>& materials) {
-  std::set<const Image*> textures{nullptr};
-  std::uint64_t pixels = 0;
+  std::set<const Texture*> textures{nullptr};
+  std::set<const TextureStore*> stores{nullptr};
+  std::uint64_t bytes = 0;
   for (const Material& material : materials) {
-    for (const Image* texture : {material.texture.get(), material.emission_texture.get()}) {
-      if (textures.insert(texture).second) pixels += texture->pixels.size();
+    for (const Texture* texture : {material.texture.get(), material.emission_texture.get()}) {
+      if (!textures.insert(texture).second) continue;
+      bytes += texture->bytes();
+      if (stores.insert(texture->store()).second) bytes += texture->store()->cache_bytes();
     }
   }
-  return pixels * sizeof(glm::vec3);
+  return bytes;
 }
 
 std::uint64_t MeshParts::bytes() const noexcept {

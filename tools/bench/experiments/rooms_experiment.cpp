@@ -95,7 +95,7 @@ Experiment make_rooms_experiment() {
     RoomsOptions given = *options;
     given.camera = parsed->camera.camera();
     if (parsed->camera.size()) given.size = *parsed->camera.size();
-    if (parsed->lights.given()) given.lights = parsed->lights.rig({0, 1, 0});
+    if (parsed->lights.given()) given.lights = parsed->lights.rig({0, 1, 0}, *TextureStore::make());
     return measure_scenes(*scenes, 1, b, [&](const SceneChoice& choice) {
       return measure_room(choice, given, b.work, b.run, b.progress);
     });

@@ -1,0 +1,119 @@
+// PNG files, read row by row through libpng. An interlaced one is decoded as a whole, because each
+// of its seven passes goes over the whole picture.
+#include <exception>
+#include <vector>
+
+#include <png.h>
+
+#include "engine/base/error.h"
+#include "engine/io/image/png_guard.h"
+#include "engine/io/image/row_reader.h"
+
+namespace ptc {
+namespace {
+
+class PngReader final : public RowReader, private PngGuard {
+ public:
+  PngReader(const ByteRange& bytes, const std::string& name, const PictureLimits& limits)
+      : cursor_(bytes, name), name_(name) {
+    png_ =
+        png_create_read_struct(PNG_LIBPNG_VER_STRING, static_cast<PngGuard*>(this), note, ignore);
+    info_ = png_ == nullptr ? nullptr : png_create_info_struct(png_);
+    if (info_ == nullptr) {
+      png_destroy_read_struct(&png_, &info_, nullptr);
+      throw std::bad_alloc();
+    }
+    try {
+      open(bytes.size(), limits);
+    } catch (...) {
+      png_destroy_read_struct(&png_, &info_, nullptr);
+      throw;
+    }
+  }
+  ~PngReader() override { png_destroy_read_struct(&png_, &info_, nullptr); }
+
+  void read(unsigned rows, std::span<std::byte> out) override {
+    const std::size_t row_bytes = width_ * pixel_bytes(type_);
+    if (interlaced_) return whole_.take(out);
+    for (unsigned row = 0; row < rows; ++row) {
+      auto* to = reinterpret_cast<png_bytep>(out.data() + row * row_bytes);
+      guarded([&] { png_read_row(png_, to, nullptr); });
+    }
+    done_ += rows;
+    if (done_ == height_) end();
+  }
+
+ private:
+  void open(std::uint64_t file_bytes, const PictureLimits& limits) {
+    guarded([&] {
+      png_set_read_fn(png_, this, fill);
+      png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+      png_read_info(png_, info_);
+    });
+    const std::uint64_t width = png_get_image_width(png_, info_),
+                        height = png_get_image_height(png_, info_);
+    check_picture_size(width, height, file_bytes, limits, name_);
+    width_ = static_cast<unsigned>(width);
+    height_ = static_cast<unsigned>(height);
+
+    // Make every kind of pixel R, G and B of 8 or 16 bits
+    type_ = png_get_bit_depth(png_, info_) == 16 ? PixelType::srgb16 : PixelType::srgb8;
+    interlaced_ = png_get_interlace_type(png_, info_) != PNG_INTERLACE_NONE;
+    guarded([&] {
+      png_set_expand(png_);
+      png_set_gray_to_rgb(png_);
+      png_set_strip_alpha(png_);
+      if (type_ == PixelType::srgb16) png_set_swap(png_);
+      if (interlaced_) png_set_interlace_handling(png_);
+      png_read_update_info(png_, info_);
+    });
+    if (interlaced_) read_whole(limits);
+  }
+
+  void read_whole(const PictureLimits& limits) {
+    const std::size_t row_bytes = width_ * pixel_bytes(type_);
+    check_picture_memory(height_ * std::uint64_t{row_bytes}, "an interlaced PNG", limits, name_);
+    std::vector<std::byte> pixels(height_ * row_bytes);
+    std::vector<png_bytep> rows(height_);
+    for (std::size_t y = 0; y < height_; ++y)
+      rows[y] = reinterpret_cast<png_bytep>(&pixels[y * row_bytes]);
+    guarded([&] { png_read_image(png_, rows.data()); });
+    end();
+    whole_ = WholeRows(std::move(pixels));
+  }
+
+  void end() {
+    guarded([&] { png_read_end(png_, nullptr); });
+  }
+
+  [[noreturn]] void fail() const override {
+    if (failure_) std::rethrow_exception(failure_);
+    cursor_.fail("libpng: " + message_);
+  }
+
+  static void fill(png_structp png, png_bytep out, std::size_t count) {
+    auto& reader = *static_cast<PngReader*>(png_get_io_ptr(png));
+    try {
+      reader.cursor_.take(std::as_writable_bytes(std::span(out, count)));
+    } catch (...) {
+      reader.failure_ = std::current_exception();
+    }
+    if (reader.failure_) png_error(png, "the file cannot be read");
+  }
+
+  ByteCursor cursor_;
+  std::string name_;
+  png_infop info_ = nullptr;
+  bool interlaced_ = false;
+  WholeRows whole_;    // of an interlaced picture
+  unsigned done_ = 0;  // rows
+};
+
+}  // namespace
+
+std::unique_ptr<RowReader> open_png(const ByteRange& bytes, const std::string& name,
+                                    const PictureLimits& limits) {
+  return std::make_unique<PngReader>(bytes, name, limits);
+}
+
+}  // namespace ptc

@@ -1,0 +1,136 @@
+// Textures in memory and in tiles on the disk.
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/image/texture.h"
+#include "tests/io/files.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+
+namespace {
+
+// A picture in which every pixel differs from those around it, in steps that 8 bits hold.
+Image steps(unsigned width, unsigned height) {
+  Image image{width, height, {}};
+  for (unsigned y = 0; y < height; ++y) {
+    for (unsigned x = 0; x < width; ++x) {
+      image.pixels.emplace_back(static_cast<float>(x % 16) / 16, static_cast<float>(y % 16) / 16,
+                                static_cast<float>((x / 16 + y / 16) % 16) / 16);
+    }
+  }
+  return image;
+}
+
+std::size_t files_in(const std::filesystem::path& directory) {
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(directory), {}));
+}
+
+}  // namespace
+
+TEST_CASE("texture store: tiles on the disk hold the pixels that memory would, in every type",
+          "[io][texture]") {
+  const test::TemporaryDirectory scratch;
+  write_png(scratch.path() / "filler.png", steps(1000, 100));
+  for (const auto& [width, height] :
+       {std::pair{1U, 1U}, {31U, 43U}, {32U, 42U}, {33U, 5U}, {257U, 130U}, {5U, 300U}}) {
+    const Image image = steps(width, height);
+    write_png(scratch.path() / "a.png", image);
+    std::vector<float> values;
+    for (const glm::vec3& pixel : image.pixels) values.insert(values.end(), &pixel.x, &pixel.x + 3);
+    for (const bool full : {false, true}) {
+      write_exr(scratch.path() / (full ? "full.exr" : "half.exr"), width, height,
+                {{{.name = "", .full_float = full}, values}});
+    }
+    for (const char* name : {"a.png", "half.exr", "full.exr"}) {
+      const Image expected = read_image(scratch.path() / name);
+      const Texture held = TextureStore::make()->read(scratch.path() / name);
+      // Fill what textures may take in memory
+      const auto store = TextureStore::make(600'000, scratch.path());
+      CHECK(store->read(scratch.path() / "filler.png").bytes() == 300'000);
+      const Texture tiled = store->read(scratch.path() / name);
+      CHECK(held.store() == nullptr);
+      CHECK(held.bytes() > 0);
+      CHECK(tiled.store() == store.get());
+      CHECK(tiled.bytes() == 0);
+      CHECK(store->cache_bytes() > 0);
+      for (unsigned y = 0; y < height; ++y) {
+        for (unsigned x = 0; x < width; ++x) {
+          REQUIRE(held.at(x, y) == expected.at(x, y));
+          REQUIRE(tiled.at(x, y) == expected.at(x, y));
+        }
+      }
+      std::vector<glm::vec3> rows;
+      tiled.visit_rows(
+          [&](std::span<const glm::vec3> row) { rows.insert(rows.end(), row.begin(), row.end()); });
+      CHECK(rows == expected.pixels);
+    }
+  }
+  CHECK(files_in(scratch.path()) == 4);  // the temporary files are gone
+}
+
+TEST_CASE("texture store: textures stay in memory as long as all of them take half of the cap",
+          "[io][texture]") {
+  const test::TemporaryDirectory scratch;
+  write_png(scratch.path() / "a.png", steps(100, 100));  // 30,000 bytes
+  const auto store = TextureStore::make(120'000, scratch.path());
+  const Texture first = store->read(scratch.path() / "a.png");
+  const Texture second = store->read(scratch.path() / "a.png");
+  CHECK(store->cache_bytes() == 0);
+  const Texture third = store->read(scratch.path() / "a.png");
+  CHECK(first.bytes() + second.bytes() == 60'000);
+  CHECK(third.bytes() == 0);
+  CHECK(store->cache_bytes() > 0);
+  CHECK(store->cache_bytes() <= 30'000);
+  CHECK(third.at(99, 99) == first.at(99, 99));
+}
+
+TEST_CASE("texture store: threads that look up the same tiles see the same pixels",
+          "[io][texture]") {
+  const test::TemporaryDirectory scratch;
+  const Image image = steps(200, 200);
+  write_png(scratch.path() / "a.png", image);
+  const Image expected = read_image(scratch.path() / "a.png");
+  const auto store = TextureStore::make(20'000, scratch.path());
+  const Texture texture = store->read(scratch.path() / "a.png");
+  REQUIRE(texture.store() != nullptr);
+  std::vector<std::size_t> wrong(4);
+  std::vector<std::thread> threads;
+  for (unsigned t = 0; t < 4; ++t) {
+    threads.emplace_back([&, t] {
+      unsigned at = t;
+      for (int i = 0; i < 20'000; ++i) {
+        at = at * 1664525 + 1013904223;
+        const unsigned x = (at >> 8) % 200, y = (at >> 16) % 200;
+        if (texture.at(x, y) != expected.at(x, y)) ++wrong[t];
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  CHECK(wrong == std::vector<std::size_t>(4));
+}
+
+TEST_CASE("texture store: what cannot be decoded row by row is refused by its size",
+          "[io][texture]") {
+  // A BMP of 200 x 200 pixels
+  const test::TemporaryDirectory scratch;
+  const std::string bmp = "BM" + raw<std::uint32_t>(120'054) + raw<std::uint32_t>(0) +
+                          raw<std::uint32_t>(54) + raw<std::uint32_t>(40) + raw<std::int32_t>(200) +
+                          raw<std::int32_t>(200) + raw<std::uint16_t>(1) + raw<std::uint16_t>(24) +
+                          std::string(24, '\0') + std::string(120'000, '\x40');
+  const auto path = scratch.file("a.bmp", bmp);
+  CHECK(TextureStore::make(500'000, scratch.path())->read(path).width() == 200);
+  const auto poor = TextureStore::make(100'000, scratch.path());
+  CHECK_THROWS_AS(poor->read(path), LimitError);
+  CHECK_THROWS_WITH(poor->read(path),
+                    Contains("a.bmp: a BMP or TGA takes ") && Contains("`run.memory_bytes`"));
+}
