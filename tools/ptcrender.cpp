@@ -117,9 +117,11 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
           },
           ""))
       ->group(kGroup);
-  ptc::add_number(app, "--exposure", arguments.request.exposure, -64, 64,
-                  "Exposure of a .png, in stops")
+  app.add_option("--exposure", arguments.request.exposure,
+                 "Exposure of a .png, in stops, without a tone curve")
       ->type_name("STOPS")
+      ->check(ptc::in_range(-64, 64))
+      ->default_str("chosen by the picture, with a curve where it has a wide range")
       ->group(kGroup);
 }
 

@@ -249,6 +249,7 @@ ordered_json facts_of(const LightingReport& report) {
   if (report.estimate) facts["estimate"] = facts_of(*report.estimate);
   if (report.check) facts["check"] = facts_of(*report.check);
   if (report.damage) facts["damage"] = damage_facts(report);
+  if (report.exposure) facts["exposure"] = *report.exposure;
   facts["seconds"] = facts_of(report.seconds);
   return facts;
 }
@@ -277,6 +278,7 @@ std::string shade_text(const std::string& output, const LightingReport& report) 
                                  report.receivers, total_seconds(report.seconds),
                                  100 * report.cache.hit_rate(), stages_text(report.seconds));
   if (report.damage) text += damage_text(report);
+  if (report.exposure) text += fmt::format("  shown at {:+.1f} stops\n", *report.exposure);
   if (report.tuning) text += tuning_text(*report.tuning);
   if (const auto& mirrors = report.mirrors) {
     text += fmt::format("  reflections: {:.2f} % measured at pilot receivers with {} rays each\n",

@@ -110,6 +110,7 @@ struct LightingReport {
   std::optional<EstimateReport> estimate;  ///< present when estimates were asked for
   std::optional<CheckReport> check;        ///< present when a check was asked for
   std::optional<DamageReport> damage;      ///< present when damage was tolerated
+  std::optional<float> exposure;           ///< that was chosen for a picture, stops
   StageSeconds seconds;                    ///< wall time of each stage
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "engine/io/text/text.h"
 
@@ -19,17 +20,31 @@ bool is_exr(const PictureTarget& target) {
   return lower_extension(target.path) == ".exr";
 }
 
+/// Says whether a target shows light, whose exposure matters.
+bool is_light(const PictureTarget& target) {
+  return !is_exr(target) && target.layer != "occlusion" && target.layer != "albedo";
+}
+
 }  // namespace
 
 PictureFiles::PictureFiles(std::span<const PictureTarget> targets, unsigned width, unsigned height,
-                           const std::vector<ExrLayerType>& layers, float exposure)
-    : targets_(targets), exposure_(exposure), exrs_(targets.size()), pngs_(targets.size()) {
+                           const std::vector<ExrLayerType>& layers, std::optional<float> exposure,
+                           const std::filesystem::path& directory)
+    : targets_(targets),
+      width_(width),
+      exposure_(exposure),
+      waiting_(targets.size()),
+      exrs_(targets.size()),
+      pngs_(targets.size()) {
   for (std::size_t i = 0; i < targets.size(); ++i) {
     if (is_exr(targets[i])) {
       exrs_[i] = std::make_unique<ExrWriter>(targets[i].path, width, height, layers);
-    } else {
-      pngs_[i] = std::make_unique<PngWriter>(targets[i].path, width, height);
+      continue;
     }
+    pngs_[i] = std::make_unique<PngWriter>(targets[i].path, width, height);
+    if (exposure_ || !is_light(targets[i])) continue;
+    waiting_[i] = std::make_unique<Spool<glm::vec3>>();
+    waiting_[i]->spill(directory);
   }
 }
 
@@ -47,29 +62,50 @@ void PictureFiles::write(const Film& film) {
         exrs_[i]->write(rows, values);
         continue;
       }
-      const std::string& layer = targets_[i].layer;
-      std::vector<glm::vec3> pixels = film.shown(layer, row, rows);
-      const bool is_light = layer != "occlusion" && layer != "albedo";
-      const float gain = is_light ? std::exp2(exposure_) : 1;
-      for (glm::vec3& pixel : pixels) pixel *= gain;
+      std::vector<glm::vec3> pixels = film.shown(targets_[i].layer, row, rows);
+      if (waiting_[i]) {
+        waiting_[i]->append(pixels);
+        continue;
+      }
+      if (is_light(targets_[i])) Display::at_exposure(*exposure_).show(pixels);
       pngs_[i]->write(pixels);
     }
+    if (std::ranges::any_of(waiting_, [](const auto& light) { return light != nullptr; }))
+      meter_.add(film.shown("beauty", row, rows));
   }
 }
 
-void PictureFiles::publish() {
+std::optional<float> PictureFiles::publish() {
+  std::optional<float> chosen;
+  const Display display = meter_.display();
   for (std::size_t i = 0; i < targets_.size(); ++i) {
     if (exrs_[i]) {
       exrs_[i]->publish();
-    } else {
-      pngs_[i]->publish();
+      continue;
     }
+    if (waiting_[i]) {
+      show(*waiting_[i], display, *pngs_[i]);
+      chosen = std::log2(display.gain);
+    }
+    pngs_[i]->publish();
+  }
+  return chosen;
+}
+
+void PictureFiles::show(Spool<glm::vec3>& light, const Display& display, PngWriter& png) const {
+  light.end();
+  SpoolReader<glm::vec3> reader(light, 0);
+  std::vector<glm::vec3> row(width_);
+  for (std::uint64_t at = 0; at < light.size(); at += width_) {
+    for (unsigned x = 0; x < width_; ++x) row[x] = reader[at + x];
+    display.show(row);
+    png.write(row);
   }
 }
 
 std::uint64_t PictureFiles::bytes(std::span<const PictureTarget> targets, unsigned width,
                                   std::span<const ExrLayerType> layers) {
-  constexpr std::uint64_t kPngBytes = 300 << 10, kPngPixelBytes = 15;
+  constexpr std::uint64_t kPngBytes = 900 << 10, kPngPixelBytes = 27;
   std::uint64_t bytes = rows_at_once(width) * std::uint64_t{width} * sizeof(glm::vec3);
   for (const PictureTarget& target : targets) {
     bytes += is_exr(target) ? ExrWriter::bytes(width, rows_at_once(width), layers)

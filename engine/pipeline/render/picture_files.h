@@ -4,11 +4,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "engine/io/file/spool.h"
 #include "engine/io/image/image.h"
+#include "engine/pipeline/render/display.h"
 #include "engine/pipeline/render/film.h"
 
 namespace ptc {
@@ -26,10 +29,13 @@ class PictureFiles {
   /// Creates temporary files.
   /// @param targets   must outlive this
   /// @param layers    of each .exr
-  /// @param exposure  stops by which a .png of light is brightened; occlusion and albedo stay
+  /// @param exposure   stops by which a .png of light is brightened; occlusion and albedo stay.
+  ///                   Empty: chosen by the beauty of the whole picture, for all layers alike
+  /// @param directory  of the temporary files of pictures whose exposure is chosen
   /// @throws std::system_error
   PictureFiles(std::span<const PictureTarget> targets, unsigned width, unsigned height,
-               const std::vector<ExrLayerType>& layers, float exposure);
+               const std::vector<ExrLayerType>& layers, std::optional<float> exposure,
+               const std::filesystem::path& directory);
 
   /// Writes the next rows, from the top of the picture down.
   /// @param film  has the layers
@@ -37,16 +43,24 @@ class PictureFiles {
   void write(const Film& film);
 
   /// Publishes the files one after another. @pre all rows are written
+  /// @return the exposure that was chosen, stops; nothing where none was needed
   /// @throws std::system_error
-  void publish();
+  std::optional<float> publish();
 
   /// Returns the memory that writing takes for each .exr and each .png.
   [[nodiscard]] static std::uint64_t bytes(std::span<const PictureTarget> targets, unsigned width,
                                            std::span<const ExrLayerType> layers);
 
  private:
+  /// Shows the light of a whole picture.
+  void show(Spool<glm::vec3>& light, const Display& display, PngWriter& png) const;
+
   std::span<const PictureTarget> targets_;
-  float exposure_;
+  unsigned width_;
+  std::optional<float> exposure_;
+  ExposureMeter meter_;  ///< of the beauty, if the exposure is chosen
+  /// For each target, its light until the exposure is known; null where that is not awaited.
+  std::vector<std::unique_ptr<Spool<glm::vec3>>> waiting_;
   std::vector<std::unique_ptr<ExrWriter>> exrs_;  ///< for each target; null for a .png
   std::vector<std::unique_ptr<PngWriter>> pngs_;  ///< for each target; null for an .exr
 };

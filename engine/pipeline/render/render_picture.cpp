@@ -445,9 +445,10 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     const Part part{.emission = rest, .held_bytes = sum_bytes};
     add_costs(report, render_part(one, targets, part, add, progress));
   }
-  PictureFiles files(targets, sum->width(), sum->height(), layer_types(*sum), request.exposure);
+  PictureFiles files(targets, sum->width(), sum->height(), layer_types(*sum), request.exposure,
+                     roomiest_temp_dir(request.run, targets.front().path));
   files.write(*sum);
-  files.publish();
+  report.exposure = files.publish();
   return report;
 }
 
@@ -456,14 +457,18 @@ LightingReport render_container(const RenderRequest& request,
                                 std::span<const PictureTarget> targets, Progress& progress) {
   if (request.light_groups) return render_groups(request, targets, progress);
   std::optional<PictureFiles> files;
+  std::optional<float> exposure;
   const auto write = [&](const Film& rows, unsigned first, const Camera& camera) {
     if (!files) {
-      files.emplace(targets, camera.width, camera.height, layer_types(rows), request.exposure);
+      files.emplace(targets, camera.width, camera.height, layer_types(rows), request.exposure,
+                    roomiest_temp_dir(request.run, targets.front().path));
     }
     files->write(rows);
-    if (first + rows.height() == camera.height) files->publish();
+    if (first + rows.height() == camera.height) exposure = files->publish();
   };
-  return render_part(request, targets, {}, write, progress);
+  LightingReport report = render_part(request, targets, {}, write, progress);
+  report.exposure = exposure;
+  return report;
 }
 
 }  // namespace

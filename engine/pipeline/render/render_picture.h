@@ -56,7 +56,9 @@ struct RenderRequest : LightingRequest {
   /// lit and rendered once for each; `error`, `estimate`, `glossy`, `shadows`, `check` and
   /// `tolerate_damage` keep their defaults then.
   bool light_groups = false;
-  float exposure = 0;  ///< stops by which a .png of light is brightened
+  /// Stops by which a .png of light is brightened; empty: chosen so that the picture is well seen
+  /// (spec/shading.md#display).
+  std::optional<float> exposure;
 };
 
 /// Renders a picture and writes it to one or more files.
