@@ -117,11 +117,10 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
           },
           ""))
       ->group(kGroup);
-  app.add_option("--exposure", arguments.request.exposure,
-                 "Exposure of a .png, in stops, without a tone curve")
+  app.add_option("--exposure", arguments.request.exposure, "Exposure of a .png, without a curve")
       ->type_name("STOPS")
       ->check(ptc::in_range(-64, 64))
-      ->default_str("chosen by the picture, with a curve where it has a wide range")
+      ->default_str("chosen, with a curve")
       ->group(kGroup);
 }
 

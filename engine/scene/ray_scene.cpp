@@ -112,6 +112,13 @@ void check_mesh(const Mesh& mesh, const char* field) {
                   "mesh: the number of normals differs from that of vertices");
   require_request(mesh.uvs.empty() || mesh.uvs.size() == vertices, field,
                   "mesh: the number of texture coordinates differs from that of vertices");
+  require_request(mesh.colours.empty() || mesh.colours.size() == vertices, field,
+                  "mesh: the number of colours differs from that of vertices");
+  for (const glm::vec3& colour : mesh.colours) {
+    for (int k = 0; k < 3; ++k)
+      require_request(colour[k] >= 0 && colour[k] <= 1, field,
+                      "mesh: the colour of a vertex is not 0 to 1");
+  }
   require_request(mesh.material_of.size() == mesh.triangles.size(), field,
                   "mesh: the number of material indices differs from that of triangles");
   for (const glm::vec3& p : mesh.positions)
@@ -145,8 +152,15 @@ struct RayScene::Impl {
   // Returns the interpolated normal, mirrored where it points to the back of the triangle.
   [[nodiscard]] glm::dvec3 shading_normal(const std::array<std::uint32_t, 3>& corners, double u,
                                           double v, const glm::dvec3& geometric) const;
+  // Returns the colour of the vertices at a point of a triangle; white without any.
+  [[nodiscard]] glm::vec3 colour_at(const std::array<std::uint32_t, 3>& corners, float u,
+                                    float v) const {
+    if (mesh.colours.empty()) return glm::vec3(1);
+    return (1 - u - v) * mesh.colours[corners[0]] + u * mesh.colours[corners[1]] +
+           v * mesh.colours[corners[2]];
+  }
   // Returns the colour of a texture at a place on a triangle; white without a texture.
-  [[nodiscard]] glm::vec3 texture_at(const Texture* texture,
+  [[nodiscard]] glm::vec3 texture_at(const Texture* texture, const TextureWrap& wrap,
                                      const std::array<std::uint32_t, 3>& corners, float u,
                                      float v) const;
 
@@ -248,13 +262,13 @@ glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& co
   return side < 0 ? normal - 2 * side * geometric : normal;  // mirror it at the surface
 }
 
-glm::vec3 RayScene::Impl::texture_at(const Texture* texture,
+glm::vec3 RayScene::Impl::texture_at(const Texture* texture, const TextureWrap& wrap,
                                      const std::array<std::uint32_t, 3>& corners, float u,
                                      float v) const {
   if (texture == nullptr || mesh.uvs.empty()) return glm::vec3(1);
   const glm::vec2 uv =
       (1 - u - v) * mesh.uvs[corners[0]] + u * mesh.uvs[corners[1]] + v * mesh.uvs[corners[2]];
-  return sample_texture(*texture, uv);
+  return sample_texture(*texture, uv, wrap);
 }
 
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
@@ -318,9 +332,11 @@ SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
   hit.position = mesh.origin + (a + u_wide * ab + v_wide * ac);
   hit.geometric_normal = glm::vec3(geometric);
   hit.normal = glm::vec3(impl_->shading_normal(corners, u_wide, v_wide, geometric));
-  hit.albedo = material.albedo * impl_->texture_at(material.texture.get(), corners, u, v);
-  hit.emission =
-      material.emission * impl_->texture_at(material.emission_texture.get(), corners, u, v);
+  hit.albedo = material.albedo *
+               impl_->texture_at(material.texture.get(), material.wrap, corners, u, v) *
+               impl_->colour_at(corners, u, v);
+  hit.emission = material.emission * impl_->texture_at(material.emission_texture.get(),
+                                                       material.emission_wrap, corners, u, v);
   return hit;
 }
 

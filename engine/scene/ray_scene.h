@@ -24,7 +24,7 @@ struct SurfaceHit {
   glm::dvec3 position{0};         ///< scene units, Mesh::origin included
   glm::vec3 geometric_normal{0};  ///< unit, of the triangle's front side (counter-clockwise)
   glm::vec3 normal{0};    ///< unit, interpolated; never on the back side of the geometric normal
-  glm::vec3 albedo{0};    ///< reflectance of the material, times its texture there
+  glm::vec3 albedo{0};    ///< reflectance of the material, times texture and vertex colour there
   glm::vec3 emission{0};  ///< radiance that the front side emits, W/(m^2 sr)
   bool front = true;      ///< whether the ray met the front side
 };

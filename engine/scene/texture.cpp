@@ -53,18 +53,29 @@ glm::vec3 blend(const Texture& image, const Pair& x, const Pair& y) {
                   y.share);
 }
 
-// The part of a coordinate behind the point, in [0, 1); 0 for one that is not finite.
-double fraction(float coordinate) {
-  if (!std::isfinite(coordinate)) return 0;
-  return static_cast<double>(coordinate) - std::floor(static_cast<double>(coordinate));
+// Returns the pixels around a texture coordinate. One that is not finite counts as 0.
+Pair around(float coordinate, unsigned size, Wrap wrap, bool flipped) {
+  double at = std::isfinite(coordinate) ? static_cast<double>(coordinate) : 0;
+  if (flipped) at = 1 - at;
+  switch (wrap) {
+    case Wrap::clamp:
+      return neighbours(std::clamp(at, 0.0, 1.0) * size, size, Border::end);
+    case Wrap::mirror:
+      // Fold the line, so that two lengths of the texture are one there and back
+      at = std::abs(at - 2 * std::floor(at / 2 + 0.5));
+      return neighbours(at * size, size, Border::end);
+    case Wrap::repeat:
+      break;
+  }
+  return neighbours((at - std::floor(at)) * size, size, Border::wrap);
 }
 
 }  // namespace
 
-glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv) {
+glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv, const TextureWrap& wrap) {
   if (image.size() == 0) return glm::vec3(1);
-  return blend(image, neighbours(fraction(uv.x) * image.width(), image.width(), Border::wrap),
-               neighbours((1 - fraction(uv.y)) * image.height(), image.height(), Border::wrap));
+  return blend(image, around(uv.x, image.width(), wrap.u, false),
+               around(uv.y, image.height(), wrap.v, true));
 }
 
 glm::vec3 sample_panorama(const Texture& image, double x, double y) {

@@ -5,15 +5,18 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/image/texture.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc {
 
-/// Returns the bilinear value of a texture that repeats in both directions.
+/// Returns the bilinear value of a texture.
 /// @param uv  texture coordinates; v = 1 is the top of row 0. A coordinate that is not finite
 ///            counts as 0.
+/// @param wrap  what lies beyond the borders
 /// @return    white where the picture has no pixels
 /// @throws as Texture::at()
-[[nodiscard]] glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv);
+[[nodiscard]] glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv,
+                                       const TextureWrap& wrap = {});
 
 /// Returns the bilinear value of a latitude-longitude map. Columns wrap around; the first and the
 /// last row go on beyond the map as they are.

@@ -91,6 +91,9 @@ TEST_CASE("display: a black picture stays black, and odd values do not count",
           "[integration][display]") {
   CHECK(display_of({}).gain == 1);
   CHECK(display_of({glm::vec3(0), glm::vec3(-1), glm::vec3(NAN), glm::vec3(INFINITY)}).gain == 1);
+  const Display wide{.gain = 2, .white = 100};
+  CHECK(shown(wide, {glm::vec3(INFINITY), glm::vec3(3e38f)})[0].x > 1);
+  CHECK(shown(wide, {glm::vec3(3e38f)})[0].y > 1);
   CHECK(Display::at_exposure(1).gain == 2);
   CHECK(Display::at_exposure(-3).white == 1);
 }

@@ -383,6 +383,71 @@ TEST_CASE("gltf: integers are scaled when they are marked as normalized", "[io][
   CHECK(corner(files.read(json).mesh, 0, 1) == glm::dvec3(1, 0, 0));
 }
 
+TEST_CASE("gltf: COLOR_0 colours the vertices of its primitive, others stay white", "[io][gltf]") {
+  const Files files;
+  const std::string colours = std::string("\xff\0\x80\x11\0\xff\0\x11\0\0\0\x11", 12);
+  Json json = document();
+  json["buffers"].push_back({{"uri", "data:;base64," + base64(colours)}, {"byteLength", 12}});
+  json["bufferViews"].push_back({{"buffer", 1}, {"byteLength", 12}});
+  json["accessors"].push_back({{"bufferView", 3},
+                               {"componentType", 5121},
+                               {"normalized", true},
+                               {"count", 3},
+                               {"type", "VEC4"}});
+  Json& primitives = json["meshes"][0]["primitives"];
+  primitives.push_back(primitives[0]);
+  primitives[1]["attributes"]["COLOR_0"] = 3;
+  primitives.push_back(primitives[0]);
+  const Mesh mesh = files.read(json).mesh;
+  REQUIRE(mesh.triangles.size() == 3);
+  REQUIRE(mesh.colours.size() == mesh.positions.size());
+  for (std::size_t k = 0; k < 3; ++k) {
+    CHECK(mesh.colours[mesh.triangles[0][k]] == glm::vec3(1));
+    CHECK(mesh.colours[mesh.triangles[2][k]] == glm::vec3(1));
+  }
+  CHECK(mesh.colours[mesh.triangles[1][0]].x == 1);
+  CHECK(static_cast<double>(mesh.colours[mesh.triangles[1][0]].z) == Approx(128 / 255.0));
+  CHECK(mesh.colours[mesh.triangles[1][1]] == glm::vec3(0, 1, 0));
+}
+
+TEST_CASE("gltf: colours that are stored sparsely are left out and told", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["accessors"].push_back({{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}});
+  json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 3;
+  const MeshFile file = files.read(json);
+  CHECK(file.mesh.colours.empty());
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], Contains("stored sparsely: accessor 3"));
+}
+
+TEST_CASE("gltf: samplers say how textures go on, and what is not understood is told",
+          "[io][gltf]") {
+  const Files files;
+  write_png(files.scratch.path() / "t.png", {1, 1, {glm::vec3(1)}});
+  Json json = document();
+  json["materials"] = Json::parse(R"([{"name": "leaf", "alphaMode": "MASK",
+    "emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 1},
+    "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}])");
+  json["textures"] = Json::parse(R"([{"source": 0, "sampler": 0}, {"source": 0, "sampler": 1}])");
+  json["samplers"] = Json::parse(R"([{"wrapS": 33071, "wrapT": 33648}, {"wrapT": 10497}])");
+  json["images"] = Json::parse(R"([{"uri": "t.png"}])");
+  json["extensionsUsed"] = {"KHR_texture_transform", "KHR_lights_punctual", "EXT_new"};
+  Json& primitive = json["meshes"][0]["primitives"][0];
+  primitive["material"] = 0;
+  primitive["attributes"]["TEXCOORD_0"] = 2;
+  const MeshFile file = files.read(json);
+  CHECK(file.mesh.materials[0].wrap == TextureWrap{Wrap::clamp, Wrap::mirror});
+  CHECK(file.mesh.materials[0].emission_wrap == TextureWrap{});
+  CHECK(file.mesh.materials[0].emission_texture);
+  REQUIRE(file.warnings.size() == 2);
+  CHECK(file.warnings[0] ==
+        "a material is solid, because its transparency is left out: 'leaf' (MASK)");
+  CHECK(file.warnings[1] == "2 extensions of glTF are left out: KHR_lights_punctual; EXT_new");
+  json["textures"][0]["sampler"] = 2;
+  CHECK_FALSE(files.fault(json).empty());
+}
+
 TEST_CASE("gltf: cameras look along -z of their node", "[io][gltf]") {
   const Files files;
   Json json = document();

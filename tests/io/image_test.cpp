@@ -12,6 +12,7 @@
 
 #include <catch2/catch.hpp>
 #include <glm/common.hpp>
+#include <zlib.h>
 
 #include "engine/base/error.h"
 #include "tests/io/files.h"
@@ -256,6 +257,38 @@ TEST_CASE("image: an HDR with empty runs or with two different sizes is refused,
   CHECK_THROWS_AS(decode(whole.substr(0, pixels + 4) + std::string(60, '\0'), "a"), DataError);
   std::string third = whole.substr(0, pixels + 6);
   CHECK_THROWS_AS(decode(third.insert(pixels - 1, " 9"), "a"), DataError);
+}
+
+TEST_CASE("png: texts that unpack to much memory are passed over", "[io][image]") {
+  // zTXt chunks between header and pixels: 4 MB of zeros each
+  const test::TemporaryDirectory scratch;
+  write_png(scratch.path() / "a.png", gradient());
+  const std::string whole = slurp(scratch.path() / "a.png");
+  std::vector<Bytef> packed(1 << 16);
+  uLongf size = packed.size();
+  const std::vector<Bytef> zeros(4'000'000);
+  REQUIRE(compress(packed.data(), &size, zeros.data(), zeros.size()) == Z_OK);
+  const std::string body = "zTXt" + std::string("a\0\0", 3) +
+                           std::string(reinterpret_cast<const char*>(packed.data()), size);
+  const auto big = [](std::uint32_t v) {
+    return std::string{static_cast<char>(v >> 24), static_cast<char>(v >> 16),
+                       static_cast<char>(v >> 8), static_cast<char>(v)};
+  };
+  const auto sum =
+      crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()));
+  const std::string chunk = big(static_cast<std::uint32_t>(body.size() - 4)) + body +
+                            big(static_cast<std::uint32_t>(sum));
+  std::string bomb = whole.substr(0, 33);
+  for (int i = 0; i < 100; ++i) bomb += chunk;
+  bomb += whole.substr(33);
+  const auto peak = [] {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;  // KiB
+  };
+  const long before = peak();
+  CHECK(decode(bomb, "a.png").pixels == read_image(scratch.path() / "a.png").pixels);
+  CHECK(peak() - before < 100'000);
 }
 
 TEST_CASE("jpeg: as many scans as encoders write are read, and more are refused", "[io][image]") {

@@ -48,6 +48,51 @@ TEST_CASE("obj: corners that differ in any index become separate vertices", "[io
   CHECK(split.normals[split.triangles[0][2]] == glm::vec3(0, 0, 1));
 }
 
+TEST_CASE("obj: numbers behind a position are its colour, and vertices without one are white",
+          "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  const Mesh mesh = read(scratch,
+                         "v 0 0 0\nv 1 0 0 1 0 0.5\nv 1 1 0 2 -1 0\nv 0 1 0 1\n"
+                         "f 1 2 3\nf 1 3 4\n")
+                        .mesh;
+  REQUIRE(mesh.colours.size() == mesh.positions.size());
+  const auto colour = [&](std::size_t triangle, std::size_t k) {
+    return mesh.colours[mesh.triangles[triangle][k]];
+  };
+  CHECK(colour(0, 0) == glm::vec3(1));
+  CHECK(colour(0, 1).x == 1);
+  CHECK(colour(0, 1).y == 0);
+  CHECK(static_cast<double>(colour(0, 1).z) == Approx(0.21404).epsilon(1e-4));
+  CHECK(colour(0, 2) == glm::vec3(1, 0, 0));
+  CHECK(colour(1, 2) == glm::vec3(1));  // a weight is no colour
+  CHECK(mesh.materials[0].albedo == glm::vec3(1));
+  // Wherever the first colour stands
+  const Mesh late = read(scratch,
+                         "usemtl none\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nv 0 1 0 1 0 0\n"
+                         "f 1 3 4\n")
+                        .mesh;
+  CHECK(late.materials[0].albedo == glm::vec3(1));
+  CHECK(late.colours[late.triangles[1][2]] == glm::vec3(1, 0, 0));
+  const Mesh grey = read(scratch, kSquare + "f 1 2 3\n").mesh;
+  CHECK(grey.colours.empty());
+  CHECK(grey.materials[0].albedo == glm::vec3(0.5F));
+}
+
+TEST_CASE("obj: a texture with -clamp ends at its borders", "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  write_png(scratch.path() / "a.png", {1, 1, {glm::vec3(1)}});
+  scratch.file("a.mtl",
+               "newmtl a\nmap_Kd -clamp on a.png\nmap_Ke a.png\nnewmtl b\nmap_Kd -clamp on "
+               "a.png\nmap_Kd -clamp off a.png\n");
+  const Mesh mesh =
+      read(scratch, "mtllib a.mtl\n" + kSquare + "usemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n").mesh;
+  REQUIRE(mesh.materials.size() == 2);
+  REQUIRE(mesh.materials[0].texture);
+  CHECK(mesh.materials[0].wrap == TextureWrap{Wrap::clamp, Wrap::clamp});
+  CHECK(mesh.materials[0].emission_wrap == TextureWrap{});
+  CHECK(mesh.materials[1].wrap == TextureWrap{});
+}
+
 TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]") {
   const test::TemporaryDirectory scratch;
   const Mesh mesh =

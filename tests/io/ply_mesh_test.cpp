@@ -98,6 +98,36 @@ TEST_CASE("ply mesh: normals become unit, broken ones flat, texture coordinates 
   CHECK(mesh.uvs[mesh.triangles[1][2]] == glm::vec2(0, 0.75F));
 }
 
+TEST_CASE("ply mesh: colours of vertices are made linear, from bytes and from floats",
+          "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  const std::string bytes =
+      kVertices + "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const Mesh mesh = read(scratch, header("ascii", bytes + kFaces) +
+                                      "0 0 0 255 0 188\n1 0 0 0 0 0\n1 1 0 0 0 0\n"
+                                      "0 1 0 255 255 255\n3 0 1 2\n3 0 2 3\n")
+                        .mesh;
+  REQUIRE(mesh.colours.size() == mesh.positions.size());
+  const glm::vec3 first = mesh.colours[mesh.triangles[0][0]];
+  CHECK(first.x == 1);
+  CHECK(first.y == 0);
+  CHECK(static_cast<double>(first.z) == Approx(0.5029).epsilon(1e-3));
+  CHECK(mesh.colours[mesh.triangles[1][2]] == glm::vec3(1));
+  REQUIRE(mesh.materials.size() == 1);
+  CHECK(mesh.materials[0].albedo == glm::vec3(1));
+
+  const std::string floats = kVertices + "property float r\nproperty float g\nproperty float b\n";
+  const Mesh other = read(scratch, header("ascii", floats + kFaces) +
+                                       "0 0 0 1 0.5 7\n1 0 0 0 0 0\n1 1 0 0 0 nan\n"
+                                       "0 1 0 1 1 1\n3 0 1 2\n3 0 2 3\n")
+                         .mesh;
+  const glm::vec3 colour = other.colours[other.triangles[0][0]];
+  CHECK(colour.x == 1);
+  CHECK(static_cast<double>(colour.y) == Approx(0.21404).epsilon(1e-4));
+  CHECK(colour.z == 1);
+  CHECK(other.colours[other.triangles[0][2]] == glm::vec3(0));
+}
+
 TEST_CASE("ply mesh: degenerate triangles and lone vertices are dropped", "[io][mesh]") {
   const test::TemporaryDirectory scratch;
   const std::string faces = "element face 4\nproperty list uchar int vertex_index\n";

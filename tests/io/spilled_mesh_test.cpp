@@ -43,6 +43,7 @@ void check_same(const std::filesystem::path& path, std::uint64_t memory_bytes = 
   CHECK(disk.spilled->bounds().high == mesh.bounds().high);
   CHECK(disk.spilled->has_normals() == !mesh.normals.empty());
   CHECK(disk.spilled->has_uvs() == !mesh.uvs.empty());
+  CHECK(disk.spilled->has_colours() == !mesh.colours.empty());
   REQUIRE(disk.spilled->materials().size() == mesh.materials.size());
   for (std::size_t i = 0; i < mesh.materials.size(); ++i)
     CHECK(disk.spilled->materials()[i].name == mesh.materials[i].name);
@@ -57,6 +58,8 @@ void check_same(const std::filesystem::path& path, std::uint64_t memory_bytes = 
       REQUIRE(triangles[i].normals[k] ==
               (mesh.normals.empty() ? glm::vec3(0) : mesh.normals[vertex]));
       REQUIRE(triangles[i].uvs[k] == (mesh.uvs.empty() ? glm::vec2(0) : mesh.uvs[vertex]));
+      REQUIRE(triangles[i].colours[k] ==
+              (mesh.colours.empty() ? glm::vec3(1) : mesh.colours[vertex]));
     }
   }
 }
@@ -95,6 +98,9 @@ TEST_CASE("spilled mesh: OBJ of all kinds", "[io][spilled]") {
   check_same(scratch.file("plain.obj", grid(100, false, false)));
   check_same(scratch.file("normals.obj", grid(20, true, false)));
   check_same(scratch.file("all.obj", grid(20, true, true)));
+  check_same(scratch.file("colours.obj",
+                          "v 0 0 0 1 0 0\nv 4 0 0 0 0.5 0.25\nv 4 4 0\nv 0 4 0 0 2 nan\n"
+                          "v 9 9 9\nf 1 2 3\nf 1 3 4\nf 2 3 5\n"));
   // Triangles that lack what others have, polygons that are not convex, and some without area
   check_same(scratch.file("mixed.obj",
                           "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nv 9 9 9\nvn 0 0 2\n"

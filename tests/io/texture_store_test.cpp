@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/image/texture.h"
+#include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;
@@ -129,6 +130,12 @@ TEST_CASE("texture store: what cannot be decoded row by row is refused by its si
                           std::string(24, '\0') + std::string(120'000, '\x40');
   const auto path = scratch.file("a.bmp", bmp);
   CHECK(TextureStore::make(500'000, scratch.path())->read(path).width() == 200);
+  // A texture that the cap refuses is no texture that is missing
+  scratch.file("a.mtl", "newmtl a\nmap_Kd a.bmp\n");
+  const auto obj =
+      scratch.file("a.obj", "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n");
+  CHECK_THROWS_AS(read_mesh(obj, {.textures = TextureStore::make(100'000, scratch.path())}),
+                  LimitError);
   const auto poor = TextureStore::make(100'000, scratch.path());
   CHECK_THROWS_AS(poor->read(path), LimitError);
   CHECK_THROWS_WITH(poor->read(path),

@@ -186,6 +186,13 @@ TEST_CASE("ray scene: a surface point has the mesh's position, colour and light"
   CHECK(hit.albedo.y == Approx(0.1f));
   CHECK(hit.emission == lamp.emission);
   CHECK_THROWS_AS(scene.surface(1, 0, 0), std::invalid_argument);
+
+  // Colours of vertices multiply the albedo, but not the emission
+  mesh.colours = {{1, 1, 1}, {0, 1, 1}, {0, 0, 1}};
+  const SurfaceHit coloured = RayScene(mesh).surface(0, 0.5f, 0.25f);
+  CHECK(coloured.albedo.x == Approx(0.05f * 0.25f));
+  CHECK(coloured.albedo.y == Approx(0.1f * 0.75f));
+  CHECK(coloured.emission == lamp.emission);
 }
 
 TEST_CASE("ray scene: the normal is interpolated and stays on the geometric side",
@@ -276,6 +283,8 @@ TEST_CASE("ray scene: numbers of a mesh that no light can use are refused", "[sc
   };
   refuses([](Mesh& m) { m.origin.x = kNaN; });
   refuses([](Mesh& m) { m.normals.back().y = kNaN; });
+  refuses([](Mesh& m) { m.colours = {glm::vec3(1)}; });
+  refuses([](Mesh& m) { m.colours.assign(m.positions.size(), glm::vec3(1.5f)); });
   refuses([](Mesh& m) { m.materials.front().albedo.g = -1; });
   refuses([](Mesh& m) { m.materials.front().albedo.g = kNaN; });
   refuses([](Mesh& m) { m.materials.front().emission.b = -1; });

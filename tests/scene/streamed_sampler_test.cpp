@@ -118,6 +118,27 @@ TEST_CASE("streamed sampler: surfels do not depend on memory or threads", "[scen
   }
 }
 
+TEST_CASE("streamed sampler: surfels have the colours of the vertices, beside a mesh without any",
+          "[scene][streamed]") {
+  Mesh coloured = terrain(40);
+  for (const glm::vec3& p : coloured.positions) coloured.colours.emplace_back(p.x, p.z, 0.25F);
+  coloured.materials[0].albedo = glm::vec3(0.8F);
+  Mesh plain = ground(0.5F);
+  plain.origin = {4, 0, 0};
+  plain.materials[0].albedo = glm::vec3(0.3F);
+  SamplingOptions options;
+  options.count = 4000;
+  std::size_t of_coloured = 0;
+  for (const Surfel& s : stream({coloured, plain}, options)) {
+    const bool is_plain = s.position.x > 2;
+    of_coloured += is_plain ? 0 : 1;
+    const glm::dvec3 expected =
+        is_plain ? glm::dvec3(0.3) : 0.8 * glm::dvec3(s.position.x, s.position.z, 0.25);
+    CHECK(glm::distance(glm::dvec3(s.albedo), expected) < 0.02);
+  }
+  CHECK(of_coloured > 1000);
+}
+
 TEST_CASE("streamed sampler: several meshes keep their origins, materials and attributes",
           "[scene][streamed]") {
   // A red square with normals at a far place, and a lamp with two sides

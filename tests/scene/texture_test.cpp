@@ -46,6 +46,22 @@ TEST_CASE("texture: between centres the value is their mean, across the border, 
   CHECK(sample_texture(image, {0.125f, 1.0f}).y == Approx(0.5f));  // of rows 0 and 1
 }
 
+TEST_CASE("texture: beyond its borders it repeats, ends or is mirrored, along each axis by itself",
+          "[scene][texture]") {
+  const Image image = numbered();
+  const TextureWrap clamp{Wrap::clamp, Wrap::clamp}, mirror{Wrap::mirror, Wrap::mirror};
+  CHECK(sample_texture(image, {-3.0f, 0.75f}, clamp) == image.at(0, 0));
+  CHECK(sample_texture(image, {1.01f, 9.0f}, clamp) == image.at(3, 0));
+  CHECK(sample_texture(image, {0.625f, -1.0f}, clamp) == image.at(2, 1));
+  CHECK(sample_texture(image, {0.0f, 0.75f}, clamp).x == 0);
+  CHECK(sample_texture(image, {1.125f, 0.75f}, mirror) == image.at(3, 0));
+  CHECK(sample_texture(image, {-0.125f, 0.75f}, mirror) == image.at(0, 0));
+  CHECK(sample_texture(image, {-0.375f, 0.75f}, mirror) == image.at(1, 0));
+  CHECK(sample_texture(image, {2.375f, -0.25f}, mirror) == image.at(1, 1));
+  CHECK(sample_texture(image, {1.0f, 0.75f}, mirror).x == 3);
+  CHECK(sample_texture(image, {1.125f, 1.75f}, {Wrap::repeat, Wrap::mirror}) == image.at(0, 1));
+}
+
 TEST_CASE("texture: unusual coordinates and empty pictures give a finite colour",
           "[scene][texture]") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -53,6 +69,10 @@ TEST_CASE("texture: unusual coordinates and empty pictures give a finite colour"
   for (const float odd : {nan, inf, -inf, 1e30f, -1e30f, 1e-30f, -1e-30f}) {
     const glm::vec3 c = sample_texture(numbered(), {odd, odd});
     CHECK(std::isfinite(c.x + c.y + c.z));
+    for (const Wrap wrap : {Wrap::clamp, Wrap::mirror}) {
+      const glm::vec3 other = sample_texture(numbered(), {odd, odd}, {wrap, wrap});
+      CHECK(std::isfinite(other.x + other.y + other.z));
+    }
   }
   CHECK(sample_texture(Image{}, {0.5f, 0.5f}) == glm::vec3(1));
   CHECK_THROWS_AS(Texture(Image{2, 2, {}}), std::invalid_argument);

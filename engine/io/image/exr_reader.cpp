@@ -128,9 +128,20 @@ class ExrReader final : public RowReader {
     width_ = static_cast<unsigned>(window_.width);
     height_ = static_cast<unsigned>(window_.height);
     chunk_rows_ = rows_of_chunk(header);
-    check_picture_memory(2 * std::uint64_t{chunk_rows_} * width_ * pixel_bytes(type_),
-                         "an EXR of chunks that high", limits, path_.string());
+    check_picture_memory(chunk_bytes(header), "an EXR of chunks that high", limits, path_.string());
     part_.emplace(*file_, 0);
+  }
+
+  // Returns the memory while chunks are decoded: their rows here and, where they are tiles, in the
+  // library, and a chunk of all channels, packed and unpacked.
+  [[nodiscard]] std::uint64_t chunk_bytes(const Imf::Header& header) const {
+    const bool tiled = header.hasTileDescription();
+    const std::uint64_t rows = std::min(chunk_rows_, height_);
+    const std::uint64_t wide = tiled ? header.tileDescription().xSize : width_;
+    std::uint64_t pixel = 0;
+    for (auto at = header.channels().begin(); at != header.channels().end(); ++at)
+      pixel += at.channel().type == Imf::HALF ? 2U : 4U;
+    return 2 * rows * width_ * pixel_bytes(type_) + 2 * (tiled ? chunk_rows_ : rows) * wide * pixel;
   }
 
   // Decodes the rows of the next chunk.

@@ -48,6 +48,8 @@ class PngReader final : public RowReader, private PngGuard {
     guarded([&] {
       png_set_read_fn(png_, this, fill);
       png_set_user_limits(png_, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
+      // Pass over texts, profiles and the like, which may unpack to gigabytes
+      png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
       png_read_info(png_, info_);
     });
     const std::uint64_t width = png_get_image_width(png_, info_),

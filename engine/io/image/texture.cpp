@@ -145,7 +145,9 @@ Texture TextureStore::read(const std::filesystem::path& path, std::uint64_t max_
 Texture TextureStore::read(const ByteRange& bytes, const std::string& name,
                            std::uint64_t max_pixels) {
   return load(
-      *open_picture(bytes, name, {.max_pixels = max_pixels, .memory_bytes = memory_bytes_}));
+      *open_picture(bytes, name,
+                    {.max_pixels = max_pixels,
+                     .memory_bytes = memory_bytes_ - std::min(memory_bytes_, this->bytes())}));
 }
 
 Texture TextureStore::load(RowReader& reader) {

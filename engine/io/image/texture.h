@@ -77,8 +77,8 @@ class Texture {
 /// Threads: textures may be looked up concurrently, but are read one at a time.
 class TextureStore : public std::enable_shared_from_this<TextureStore> {
  public:
-  /// @param memory_bytes  cap on the memory of the textures, and again on what the decoder of a
-  ///                      picture takes that cannot be decoded row by row, bytes
+  /// @param memory_bytes  cap on the memory of the textures, with what the decoder of a picture
+  ///                      takes that cannot be decoded row by row, bytes
   /// @param directory     of the temporary file
   [[nodiscard]] static std::shared_ptr<TextureStore> make(
       std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max(),
@@ -98,6 +98,8 @@ class TextureStore : public std::enable_shared_from_this<TextureStore> {
   [[nodiscard]] Texture read(const ByteRange& bytes, const std::string& name,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
+  /// Returns the memory of the textures and of the cache, bytes.
+  [[nodiscard]] std::uint64_t bytes() const noexcept { return held_ + cache_bytes(); }
   /// Returns the memory of the cache of tiles, bytes; 0 as long as all textures are in memory.
   [[nodiscard]] std::uint64_t cache_bytes() const noexcept;
 

@@ -36,20 +36,27 @@ void flatten(Mesh& mesh) {
       flat.positions.push_back(mesh.positions[vertex]);
       flat.normals.push_back(normal);
       if (!mesh.uvs.empty()) flat.uvs.push_back(mesh.uvs[vertex]);
+      if (!mesh.colours.empty()) flat.colours.push_back(mesh.colours[vertex]);
       vertex = static_cast<std::uint32_t>(flat.positions.size() - 1);
     }
   }
   mesh.positions = std::move(flat.positions);
   mesh.normals = std::move(flat.normals);
   mesh.uvs = std::move(flat.uvs);
+  mesh.colours = std::move(flat.colours);
 }
 
-// Adds normals or texture coordinates to the mesh that lacks them, if the other one has them.
+// Adds normals, texture coordinates or colours to the mesh that lacks them, if the other one has
+// them.
 void level_attributes(Mesh& a, Mesh& b) {
   if (a.normals.empty() != b.normals.empty()) flatten(a.normals.empty() ? a : b);
   if (a.uvs.empty() != b.uvs.empty()) {
     Mesh& without = a.uvs.empty() ? a : b;
     without.uvs.assign(without.positions.size(), glm::vec2(0));
+  }
+  if (a.colours.empty() != b.colours.empty()) {
+    Mesh& without = a.colours.empty() ? a : b;
+    without.colours.assign(without.positions.size(), glm::vec3(1));
   }
 }
 
@@ -145,6 +152,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, con
   } else {
     mesh.normals.clear();
     mesh.uvs.clear();
+    mesh.colours.clear();
   }
 
   // Append it, with the indices of its vertices and materials moved.
@@ -156,6 +164,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, con
   mesh.positions.insert(mesh.positions.end(), added.positions.begin(), added.positions.end());
   mesh.normals.insert(mesh.normals.end(), added.normals.begin(), added.normals.end());
   mesh.uvs.insert(mesh.uvs.end(), added.uvs.begin(), added.uvs.end());
+  mesh.colours.insert(mesh.colours.end(), added.colours.begin(), added.colours.end());
   for (const auto& triangle : added.triangles) {
     auto& moved = mesh.triangles.emplace_back(triangle);
     for (std::uint32_t& vertex : moved) vertex += static_cast<std::uint32_t>(base);

@@ -20,15 +20,31 @@
 
 namespace ptc {
 
+/// What lies beyond the border of a texture, along u or v.
+enum class Wrap : std::uint8_t {
+  repeat,  ///< the texture again
+  clamp,   ///< the pixels of its border
+  mirror   ///< the texture, and its mirror image by turns
+};
+
+/// How a texture goes on beyond its borders.
+struct TextureWrap {
+  Wrap u = Wrap::repeat, v = Wrap::repeat;
+
+  bool operator==(const TextureWrap&) const = default;
+};
+
 /// A material: diffuse reflectance and emission of a set of triangles.
 struct Material {
   std::string name;        ///< as the file has it; may be empty
   glm::vec3 albedo{0.5f};  ///< linear RGB; multiplied by the texture if there is one
-  std::shared_ptr<const Texture> texture;  ///< linear RGB, row 0 at the top, repeats; may be null
+  std::shared_ptr<const Texture> texture;  ///< linear RGB, row 0 at the top; may be null
   /// Radiance of the front side, RGB, W / (m^2 sr); multiplied by `emission_texture` if there is
   /// one.
   glm::vec3 emission{0};
   std::shared_ptr<const Texture> emission_texture;  ///< as `texture`
+  TextureWrap wrap;                                 ///< of `texture`
+  TextureWrap emission_wrap;                        ///< of `emission_texture`
   bool double_sided = false;                        ///< the back reflects as the front does (glTF)
 };
 
@@ -44,6 +60,8 @@ struct Mesh {
   /// Texture coordinates, one pair per vertex, or empty. v grows upwards: (0, 0) is the bottom left
   /// corner of the texture, so the row of the image is (1 - v) * height.
   std::vector<glm::vec2> uvs;
+  /// Colours by which the albedo is multiplied, linear RGB from 0 to 1, one per vertex; or empty.
+  std::vector<glm::vec3> colours;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from the front
   std::vector<std::uint16_t> material_of;               ///< index into materials, per triangle
   std::vector<Material> materials;                      ///< at least one
@@ -94,8 +112,11 @@ struct MeshFile {
 ///
 /// Albedo is Kd of MTL and the base colour of glTF, emission Ke and emissiveFactor, all linear,
 /// with their textures. A map_Ke without Ke is the emission itself. A texture that is missing or
-/// damaged causes a warning, and the plain colour takes its place. Vertex colours, skins and morph
-/// targets are left out.
+/// damaged causes a warning, and the plain colour takes its place. Colours of vertices multiply it:
+/// COLOR_0 of glTF, linear; red, green and blue of PLY and of what follows the coordinates in OBJ,
+/// on the sRGB curve. Vertices without a colour are white, and so is a material that is not given
+/// where there are colours. What a file asks for beyond that (skins, transparency, extensions of
+/// glTF) is left out and told by a warning; morph targets are left out.
 /// @param room  for the mesh; one that takes more memory than that is left on the disk
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not
 ///         finite; LimitError when the JSON of a glTF does not fit in memory; std::system_error

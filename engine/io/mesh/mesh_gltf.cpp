@@ -32,6 +32,13 @@ namespace {
 using Corner = MeshSoup::Corner;
 using Json = GltfDocument::Json;
 
+// The extensions that are understood; others are told. Pictures in WebP have warnings of their own.
+constexpr std::array<std::string_view, 6> kUnderstood = {"KHR_materials_emissive_strength",
+                                                         "KHR_materials_pbrSpecularGlossiness",
+                                                         "KHR_materials_unlit",
+                                                         "KHR_mesh_quantization",
+                                                         "KHR_texture_transform",
+                                                         "EXT_texture_webp"};
 // The extensions that a file may require: each is either understood or can be left out with little
 // harm.
 constexpr std::array<std::string_view, 14> kKnownExtensions = {
@@ -94,6 +101,7 @@ class GltfMesh {
     for (std::size_t i = 0; i < document_.count("skins"); ++i) {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }
+    warn_of_extensions();
     return mesh_file(std::move(soup_), std::move(cameras_), warnings_.lines());
   }
 
@@ -105,6 +113,17 @@ class GltfMesh {
       if (std::ranges::find(kKnownExtensions, text) == kKnownExtensions.end()) {
         document_.fail("the extension '" + text + "' is not supported");
       }
+    }
+  }
+
+  // Tells which extensions a file uses that are not understood.
+  void warn_of_extensions() {
+    for (std::size_t i = 0; i < document_.count("extensionsUsed"); ++i) {
+      const Json& used = document_.root()["extensionsUsed"][i];
+      if (!used.is_string()) continue;
+      const std::string name = used.get<std::string>();
+      if (std::ranges::find(kUnderstood, name) == kUnderstood.end())
+        warnings_.add(kExtensionLeftOut, name);
     }
   }
 
@@ -219,6 +238,7 @@ class GltfMesh {
     soup_.normals.grow(soup_.positions.size(), glm::vec3(0));
     add_uvs(attributes, positions.count, material);
     soup_.uvs.grow(soup_.positions.size(), glm::vec2(0));
+    add_colours(attributes, positions.count);
     return positions.count;
   }
 
@@ -254,6 +274,23 @@ class GltfMesh {
       const double v = material.place.offset.y - sine * scaled.x + cosine * scaled.y;
       soup_.add_uv({u, 1 - v});  // v of glTF grows downwards
     });
+  }
+
+  // Adds the colours of vertices, whose positions are there; alpha is left out.
+  void add_colours(const Json& attributes, std::uint64_t count) {
+    const auto index = document_.unsigned_at(attributes, "COLOR_0");
+    if (!index) return;
+    const Json& accessor = document_.at("accessors", *index);
+    if (accessor.contains("sparse") || !accessor.contains("bufferView")) {
+      warnings_.add(kColoursLeftOut, "accessor " + std::to_string(*index));
+      return;
+    }
+    const bool has_alpha = accessor.contains("type") && accessor["type"] == "VEC4";
+    std::uint64_t vertex = soup_.positions.size() - count;
+    document_.read(document_.find_elements(*index, has_alpha ? 4 : 3, count),
+                   [&](std::span<const double> c) {
+                     soup_.add_colour(vertex++, {c[0], c[1], c[2]});
+                   });
   }
 
   // Adds the triangles of a list, strip or fan.
@@ -314,6 +351,9 @@ class GltfMesh {
     if (title != json.end() && title->is_string()) material.name = title->get<std::string>();
     const auto sides = json.find("doubleSided");
     material.double_sided = sides != json.end() && sides->is_boolean() && sides->get<bool>();
+    const auto alpha = json.find("alphaMode");
+    if (alpha != json.end() && alpha->is_string() && *alpha != "OPAQUE")
+      warnings_.add(kAlphaLeftOut, "'" + material.name + "' (" + alpha->get<std::string>() + ")");
     if (const Json* const old = extension(json, "KHR_materials_pbrSpecularGlossiness")) {
       read_base(*old, "diffuseFactor", "diffuseTexture", material, made);
     } else if (const Json* const pbr = member(json, "pbrMetallicRoughness")) {
@@ -333,6 +373,7 @@ class GltfMesh {
     const Json* const info = member(json, texture);
     if (info == nullptr) return;
     material.texture = load_texture(*info);
+    material.wrap = wrap_of(*info);
     made.place = place_of(*info);
   }
 
@@ -350,6 +391,22 @@ class GltfMesh {
     return place;
   }
 
+  // Reads how a texture goes on beyond its borders.
+  [[nodiscard]] TextureWrap wrap_of(const Json& info) const {
+    const auto texture = document_.unsigned_at(info, "index");
+    const auto sampler = texture
+                             ? document_.unsigned_at(document_.at("textures", *texture), "sampler")
+                             : std::nullopt;
+    if (!sampler) return {};
+    const Json& json = document_.at("samplers", *sampler);
+    const auto wrap = [&](const char* key) {
+      constexpr std::uint64_t kClamp = 33071, kMirror = 33648, kRepeat = 10497;
+      const std::uint64_t value = document_.unsigned_at(json, key).value_or(kRepeat);
+      return value == kClamp ? Wrap::clamp : value == kMirror ? Wrap::mirror : Wrap::repeat;
+    };
+    return {wrap("wrapS"), wrap("wrapT")};
+  }
+
   // Reads the emission. A mesh has one set of texture coordinates: where the emission texture lies
   // on another than that of the base colour, it is replaced by its mean, so that the emitted power
   // is right.
@@ -365,6 +422,7 @@ class GltfMesh {
     const auto image = info == nullptr ? nullptr : load_texture(*info);
     if (image && (!material.texture || place_of(*info) == made.place)) {
       material.emission_texture = image;
+      material.emission_wrap = wrap_of(*info);
       made.place = place_of(*info);
     } else if (image) {
       mean = mean_of(image);

@@ -1,7 +1,7 @@
 // Reads meshes from Wavefront OBJ: polygons with materials. Source: Wavefront, "Object Files
 // (.obj)", Advanced Visualizer manual, appendix B1.
 //
-//   v x y z            a position              f 1/1/1 2/2/1 3/3/1   a polygon, corners
+//   v x y z [r g b]    a position              f 1/1/1 2/2/1 3/3/1   a polygon, corners
 //   vn x y z           a normal                                      POSITION[/[UV][/NORMAL]]
 //   vt u v             texture coordinates     usemtl NAME           material of what follows
 //   mtllib FILE ...    material libraries      # ...                 comment
@@ -9,6 +9,7 @@
 // Statements of other kinds (groups, curves, smoothing) are skipped. Positions, normals and texture
 // coordinates are counted separately; negative indices count backwards from the last one read.
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <map>
 #include <new>
@@ -16,6 +17,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/image/srgb.h"
 #include "engine/io/mesh/mesh_soup.h"
 #include "engine/io/mesh/mtl.h"
 #include "engine/io/text/byte_stream.h"
@@ -37,6 +39,10 @@ class ObjMesh {
   MeshFile read() {
     std::string_view line;
     while (next_logical_line(line)) read_line(line);
+    // What has no material is white where vertices have colours
+    for (const std::size_t plain : plain_) {
+      if (!soup_.colours.empty()) soup_.materials[plain].albedo = glm::vec3(1);
+    }
     return mesh_file(std::move(soup_), {}, warnings_.lines());
   }
 
@@ -64,6 +70,7 @@ class ObjMesh {
     if (keyword == "v") {
       const auto p = read_numbers<3>(words, 3);
       soup_.add_position({p[0], p[1], p[2]});
+      read_colour(words);
     } else if (keyword == "vn") {
       const auto n = read_numbers<3>(words, 3);
       soup_.add_normal({n[0], n[1], n[2]});
@@ -93,6 +100,18 @@ class ObjMesh {
       numbers[i] = *number;
     }
     return numbers;
+  }
+
+  // Reads the colour behind a position, on the sRGB curve from 0 to 1. One or two numbers more are
+  // no colour.
+  void read_colour(Words words) {
+    std::array<double, 3> colour{};
+    for (double& channel : colour) {
+      const auto number = parse_number(words.next());
+      if (!number) return;
+      channel = srgb_to_linear(std::clamp(*number, 0.0, 1.0));
+    }
+    soup_.add_colour(soup_.positions.size() - 1, {colour[0], colour[1], colour[2]});
   }
 
   // Returns the index from 0 on for a word that counts from 1 on, or backwards from -1, the last
@@ -127,7 +146,10 @@ class ObjMesh {
     for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
       corners_.push_back(read_corner(word));
     }
-    if (!material_) material_ = soup_.add_material({});
+    if (!material_) {
+      material_ = soup_.add_material({});
+      plain_.push_back(*material_);
+    }
     soup_.add_polygon(corners_, *material_);
   }
 
@@ -143,7 +165,9 @@ class ObjMesh {
     } else {
       warnings_.add(kMaterialUndefined, "'" + name + "'");
     }
-    return used_[name] = soup_.add_material(std::move(material));
+    const std::size_t index = used_[name] = soup_.add_material(std::move(material));
+    if (defined == defined_.end()) plain_.push_back(index);
+    return index;
   }
 
   // Reads libraries: names that are separated by blanks, or one name with blanks in it, which may
@@ -174,6 +198,8 @@ class ObjMesh {
       read_mtl(path, textures_, defined_, warnings_);
     } catch (const std::bad_alloc&) {
       throw;
+    } catch (const LimitError&) {
+      throw;
     } catch (const std::exception& error) {
       warnings_.add(kLibraryLeftOut, reason_for(name, path, error));
     }
@@ -189,6 +215,7 @@ class ObjMesh {
   std::map<std::string, Material> defined_;  // materials of the libraries by name
   std::map<std::string, std::size_t> used_;  // index in the soup by name
   std::optional<std::size_t> material_;      // of the next face
+  std::vector<std::size_t> plain_;           // materials that no library defines
   std::vector<Corner> corners_;              // of one face, kept between calls
 };
 

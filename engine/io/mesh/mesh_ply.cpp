@@ -1,8 +1,10 @@
 // Reads meshes from PLY: faces or triangle strips.
+#include <algorithm>
 #include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/ply.h"
+#include "engine/io/image/srgb.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -21,6 +23,10 @@ class PlyMesh {
     if (!position_) throw DataError(path.string() + ": the PLY vertices lack x, y or z");
     normal_ = find_all<3>({{{"nx", "normal_x"}, {"ny", "normal_y"}, {"nz", "normal_z"}}});
     uv_ = find_all<2>({{{"u", "s", "texture_u"}, {"v", "t", "texture_v"}}});
+    colour_ = find_all<3>({{{"red", "r", "diffuse_red"},
+                            {"green", "g", "diffuse_green"},
+                            {"blue", "b", "diffuse_blue"}}});
+    if (colour_) soup_.add_material({.albedo = glm::vec3(1)});
   }
 
   MeshFile read() {
@@ -53,6 +59,19 @@ class PlyMesh {
     return found;
   }
 
+  // Returns the value of a colour that stands for 1.
+  static double most_of(PlyType type) {
+    switch (type) {
+      case PlyType::float32:
+      case PlyType::float64:
+        return 1;
+      case PlyType::uint16:
+        return 65535;
+      default:  // wider integers hold bytes
+        return 255;
+    }
+  }
+
   void read_vertices(const PlyElement& element) {
     PlyRecord record;
     for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -65,6 +84,14 @@ class PlyMesh {
         soup_.add_normal({value(n[0]), value(n[1]), value(n[2])});
       }
       if (uv_) soup_.add_uv({value((*uv_)[0]), value((*uv_)[1])});
+      if (colour_) {
+        const auto linear = [&](std::size_t at) {
+          return srgb_to_linear(
+              std::clamp(value(at) / most_of(element.properties[at].type), 0.0, 1.0));
+        };
+        const auto& c = *colour_;
+        soup_.add_colour(i, {linear(c[0]), linear(c[1]), linear(c[2])});
+      }
     }
   }
 
@@ -122,6 +149,7 @@ class PlyMesh {
   std::optional<std::array<std::size_t, 3>> position_;
   std::optional<std::array<std::size_t, 3>> normal_;
   std::optional<std::array<std::size_t, 2>> uv_;
+  std::optional<std::array<std::size_t, 3>> colour_;
   MeshSoup soup_;
   std::vector<Corner> corners_;
 };

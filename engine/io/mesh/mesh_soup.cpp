@@ -187,6 +187,7 @@ void share_vertices(const MeshSoup& soup, const std::vector<Triangle>& triangles
       mesh.positions.push_back(positions[corner.position]);
       if (!soup.normals.empty()) mesh.normals.push_back(soup.normals.items()[corner.normal]);
       if (!soup.uvs.empty()) mesh.uvs.push_back(soup.uvs.items()[corner.uv]);
+      if (!soup.colours.empty()) mesh.colours.push_back(soup.colours.items()[corner.position]);
     }
     mesh.triangles[i / 3][i % 3] = vertex_of[first[i]];
   }
@@ -203,6 +204,13 @@ MeshSoup::Corner MeshSoup::checked(Corner corner, std::uint64_t polygon) const {
       !within(corner.uv, uvs.size()))
     refuse(path_, "polygon " + std::to_string(polygon) + ": an index refers to no vertex");
   return corner;
+}
+
+void MeshSoup::add_colour(std::uint64_t position, const glm::vec3& colour) {
+  colours.grow(position, glm::vec3(1));
+  const auto inside = [](float v) { return v > 0 ? std::min(v, 1.0F) : 0.0F; };  // NaN becomes 0
+  colours.push_back({inside(colour.x), inside(colour.y), inside(colour.z)});
+  if (colours.size() % kItemsBetweenChecks == 0) check_room();
 }
 
 std::size_t MeshSoup::add_material(Material material) {
@@ -227,7 +235,7 @@ void MeshSoup::drop_uvs() {
 std::uint64_t MeshSoup::peak_bytes() const noexcept {
   // The bytes of an item of each list, and of what build_mesh() makes of it before it is freed
   return 12 * corners.size() + 94 * triangles_ + 8 * polygons.size() + 56 * positions.size() +
-         40 * normals.size() + 24 * uvs.size();
+         40 * normals.size() + 24 * uvs.size() + 24 * colours.size();
 }
 
 void MeshSoup::check_room() {
@@ -236,16 +244,19 @@ void MeshSoup::check_room() {
   positions.spill(room_.temp_directory);
   normals.spill(room_.temp_directory);
   uvs.spill(room_.temp_directory);
+  colours.spill(room_.temp_directory);
   corners.spill(room_.temp_directory);
   polygons.spill(room_.temp_directory);
 }
 
 void MeshSoup::settle() {
+  if (!colours.empty()) colours.grow(positions.size(), glm::vec3(1));
   check_room();
   if (!spilled()) return;
   positions.end();
   normals.end();
   uvs.end();
+  colours.end();
   corners.end();
   polygons.end();
 }

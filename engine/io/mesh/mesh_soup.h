@@ -57,6 +57,7 @@ class MeshSoup {
   Spool<glm::dvec3> positions;  ///< world coordinates, scene units
   Spool<glm::vec3> normals;     ///< of any length; zero and non-finite ones count as missing
   Spool<glm::vec2> uvs;         ///< as Mesh::uvs
+  Spool<glm::vec3> colours;     ///< as Mesh::colours, in the order of the positions; may be fewer
   Spool<Corner> corners;        ///< corners of all polygons, one polygon after another
   Spool<Polygon> polygons;
   std::vector<Material> materials;  ///< if empty, a material of default values is used
@@ -81,6 +82,11 @@ class MeshSoup {
     uvs.push_back(uv);
     if (uvs.size() % kItemsBetweenChecks == 0) check_room();
   }
+  /// Gives a position a colour; those before it that have none become white.
+  /// @param position  index, behind those of all colours so far
+  /// @param colour    linear RGB; is brought into [0, 1]
+  /// @throws as add_position()
+  void add_colour(std::uint64_t position, const glm::vec3& colour);
   /// Adds a material and returns its index.
   /// @throws DataError when there are 65,536 materials already
   std::size_t add_material(Material material);

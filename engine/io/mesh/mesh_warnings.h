@@ -32,6 +32,14 @@ inline constexpr WarningKind kLibraryLeftOut{
     "material libraries are left out and their materials become plain grey"};
 inline constexpr WarningKind kMaterialUndefined{"a material is not defined and becomes plain grey",
                                                 "materials are not defined and become plain grey"};
+inline constexpr WarningKind kAlphaLeftOut{
+    "a material is solid, because its transparency is left out",
+    "materials are solid, because their transparency is left out"};
+inline constexpr WarningKind kColoursLeftOut{
+    "colours of vertices are left out, because they are stored sparsely",
+    "lists of colours of vertices are left out, because they are stored sparsely"};
+inline constexpr WarningKind kExtensionLeftOut{"an extension of glTF is left out",
+                                               "extensions of glTF are left out"};
 inline constexpr WarningKind kSkinLeftOut{
     "a skin is left out and its mesh keeps the pose in which it is stored",
     "skins are left out and their meshes keep the pose in which they are stored"};

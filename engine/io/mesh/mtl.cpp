@@ -54,10 +54,10 @@ class MtlReader {
       read_colour(words, std::numeric_limits<float>::max(), current_->emission);
       emission_given_ = true;
     } else if (keyword == "map_Kd") {
-      const std::string name = file_name(words);
+      const std::string name = file_name(words, current_->wrap);
       if (!name.empty()) current_->texture = textures_.load(name);
     } else if (keyword == "map_Ke") {
-      const std::string name = file_name(words);
+      const std::string name = file_name(words, current_->emission_wrap);
       if (!name.empty()) current_->emission_texture = textures_.load(name);
       // A map alone is the emission
       if (current_->emission_texture && !emission_given_) current_->emission = glm::vec3(1);
@@ -84,8 +84,10 @@ class MtlReader {
     }
   }
 
-  // Returns what follows the options, each of which is -NAME and its values.
-  static std::string file_name(Words words) {
+  // Returns what follows the options, each of which is -NAME and its values. Of these, -clamp is
+  // understood.
+  static std::string file_name(Words words, TextureWrap& wrap) {
+    wrap = {};
     for (;;) {
       Words ahead = words;
       const std::string_view option = ahead.next();
@@ -98,6 +100,7 @@ class MtlReader {
         // The options -o, -s and -t may have fewer than three numbers.
         if (i > 0 && values == 3 && !parse_number(value)) break;
         ahead = after;
+        if (option == "-clamp" && value == "on") wrap = {Wrap::clamp, Wrap::clamp};
       }
       words = ahead;
     }

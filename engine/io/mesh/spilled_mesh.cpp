@@ -1,8 +1,8 @@
 // Triangles are made anew in each pass from the polygons and vertices of the soup:
 //
 //   polygons, corners    read from front to back
-//   positions, normals   read through a cache, because polygons that follow one another are mostly
-//   and uvs              neighbours
+//   positions, normals,  read through a cache, because polygons that follow one another are mostly
+//   uvs, colours         neighbours
 //
 // The first pass over the triangles checks indices and finds what all triangles have in common.
 #include "engine/io/mesh/spilled_mesh.h"
@@ -32,7 +32,8 @@ class TriangleReader {
         corners_(soup.corners, 1 << 14),
         positions_(soup.positions, 4 << 20),
         normals_(soup.normals, 2 << 20),
-        uvs_(soup.uvs, 1 << 20) {}
+        uvs_(soup.uvs, 1 << 20),
+        colours_(soup.colours, 1 << 18) {}
 
   /// Calls take(triangle, normals, uvs) for each triangle with an area. `normals` and `uvs` say
   /// whether a corner has such a value; corners that lack a normal have that of the plane.
@@ -52,6 +53,10 @@ class TriangleReader {
         const auto& [a, b, c] = triangle.positions;
         if (!has_area(a, b, c)) continue;
         const bool normals = find_normals(cut, triangle), uvs = find_uvs(cut, triangle);
+        if (!soup_.colours.empty()) {
+          for (std::size_t k = 0; k < 3; ++k)
+            triangle.colours[k] = colours_[of_polygon_[cut[k]].position];
+        }
         take(triangle, normals, uvs);
       }
     }
@@ -105,6 +110,7 @@ class TriangleReader {
   SpoolReader<glm::dvec3> positions_;
   SpoolReader<glm::vec3> normals_;
   SpoolReader<glm::vec2> uvs_;
+  SpoolReader<glm::vec3> colours_;
   std::vector<Corner> of_polygon_;  ///< corners of one polygon
   std::vector<glm::dvec3> world_;   ///< their positions
   std::vector<std::array<std::uint32_t, 3>> cut_;
@@ -136,6 +142,10 @@ SpilledMesh::~SpilledMesh() = default;
 
 const std::vector<Material>& SpilledMesh::materials() const noexcept {
   return soup_->materials;
+}
+
+bool SpilledMesh::has_colours() const noexcept {
+  return !soup_->colours.empty();
 }
 
 void SpilledMesh::visit(const Visit& visit) const {

@@ -23,7 +23,8 @@ struct MeshTriangle {
   std::array<glm::vec3, 3> positions{};  ///< relative to the origin, scene units
   std::array<glm::vec3, 3> normals{};    ///< unit; 0 where the mesh has no normals
   std::array<glm::vec2, 3> uvs{};        ///< as Mesh::uvs; 0 where the mesh has none
-  std::uint32_t material = 0;            ///< index into the materials
+  std::array<glm::vec3, 3> colours{glm::vec3(1), glm::vec3(1), glm::vec3(1)};  ///< as Mesh::colours
+  std::uint32_t material = 0;  ///< index into the materials
 };
 
 /// The triangles of a file in temporary files, as read_mesh() would give them in a Mesh.
@@ -48,6 +49,7 @@ class SpilledMesh {
   [[nodiscard]] std::uint64_t triangles() const noexcept { return triangles_; }
   [[nodiscard]] bool has_normals() const noexcept { return has_normals_; }
   [[nodiscard]] bool has_uvs() const noexcept { return has_uvs_; }
+  [[nodiscard]] bool has_colours() const noexcept;
 
   /// Gets triangles in the order of the file, some at a time.
   using Visit = std::function<void(std::span<const MeshTriangle>)>;

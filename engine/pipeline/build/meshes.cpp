@@ -60,7 +60,8 @@ class Joiner {
   /// Returns the room that is left for another mesh. What reading takes at its peak is four times
   /// the mesh, or more.
   [[nodiscard]] MeshRoom room() const {
-    const auto left = [&](std::uint64_t cap) { return cap > held_ ? cap - held_ : 0; };
+    const std::uint64_t held = held_ + textures_->bytes();
+    const auto left = [&](std::uint64_t cap) { return cap > held ? cap - held : 0; };
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
     const std::uint64_t kept = left(limits_.kept);
     return {std::min(left(limits_.reading), kept > kMost / 4 ? kMost : 4 * kept),

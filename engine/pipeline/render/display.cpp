@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/common.hpp>
+
 namespace ptc {
 namespace {
 
+constexpr float kMost = 1e18F;       // its square is still a finite float
 constexpr double kGrey = 0.18;       // what the mean of the picture becomes, at least
 constexpr double kBright = 0.9;      // what its bright pixels become, at least
 constexpr double kShare = 1 / 200.;  // of pixels that may be brighter than those
@@ -19,7 +22,7 @@ Display Display::at_exposure(float stops) noexcept {
 void Display::show(std::span<glm::vec3> light) const noexcept {
   const float curve = 1 / (white * white);
   for (glm::vec3& pixel : light) {
-    pixel *= gain;
+    pixel = glm::min(pixel * gain, kMost);
     if (white > 1) pixel *= (1.0F + curve * pixel) / (1.0F + pixel);
   }
 }

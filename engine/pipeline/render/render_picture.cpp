@@ -84,12 +84,15 @@ struct Part {
   std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
 };
 
-/// Returns the memory for meshes. While they are read, nothing else takes any.
+/// Returns the memory for meshes. While they are read, only the sky takes any beside them.
 /// @param target  as for roomiest_temp_dir()
-MeshLimits mesh_limits(const RenderRequest& request, const std::filesystem::path& target) {
+MeshLimits mesh_limits(const RenderRequest& request, const Sky& sky,
+                       const std::filesystem::path& target) {
   constexpr std::uint64_t kOthers = std::uint64_t{96} << 20;  // a tile, rows, a gather, its pages
   constexpr std::uint64_t kLeast = std::uint64_t{26} << 20;   // refused rather than not seen
-  const std::uint64_t left = budget_of(request.run.memory_bytes, "this picture").left();
+  MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
+  charge_sky(budget, sky);
+  const std::uint64_t left = budget.left();
   return {.reading = left,
           .kept = kLeast,
           .traced = std::max(left > kOthers ? left - kOthers : 0, kLeast),
@@ -100,11 +103,12 @@ MeshLimits mesh_limits(const RenderRequest& request, const std::filesystem::path
 /// Loads the meshes and finds the camera.
 /// @param target  as for roomiest_temp_dir()
 void load_subject(Subject& subject, const RenderRequest& request, const Part& part,
-                  const ContainerReader& scene, const std::filesystem::path& target,
+                  const ContainerReader& scene, const Sky& sky, const std::filesystem::path& target,
                   Progress& progress) {
   std::vector<MeshCamera> cameras;
-  LoadedMeshes meshes = load_meshes(request.meshes, request.mesh.get(), request.backdrop,
-                                    mesh_limits(request, target), progress, &cameras, "meshes");
+  LoadedMeshes meshes =
+      load_meshes(request.meshes, request.mesh.get(), request.backdrop,
+                  mesh_limits(request, sky, target), progress, &cameras, "meshes");
   if (meshes.parts) {
     progress.note("the meshes do not fit in memory: the camera sees the surfels");
   }
@@ -354,7 +358,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
                      : recorded_lights(lighting.scene(),
                                        *texture_store(request.run, targets.front().path), progress);
   check_names(request, targets, lights.sky.map_path);
-  load_subject(subject, request, part, lighting.scene(), targets.front().path, progress);
+  load_subject(subject, request, part, lighting.scene(), lights.sky, targets.front().path,
+               progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
   if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
   const std::vector<LightRig> rigs = rigs_of_groups(lights, request.shadows);
@@ -415,10 +420,11 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
           : recorded_lights(scene, *texture_store(request.run, targets.front().path), progress);
   check_names(request, targets, rig.sky.map_path);
   Progress silent;
-  const bool emits = may_emit(scene) || load_meshes(request.meshes, request.mesh.get(), false,
-                                                    mesh_limits(request, targets.front().path),
-                                                    silent, nullptr, "meshes")
-                                            .mesh.emits();
+  const bool emits =
+      may_emit(scene) ||
+      load_meshes(request.meshes, request.mesh.get(), false,
+                  mesh_limits(request, rig.sky, targets.front().path), silent, nullptr, "meshes")
+          .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
   const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
   LightingReport report;

@@ -70,7 +70,8 @@ class Cutter {
     const auto add = [&](double u, double v) {
       const glm::dvec2 at = (1 - u - v) * part.uv[0] + u * part.uv[1] + v * part.uv[2];
       const glm::vec3 light =
-          material_.emission * sample_texture(*material_.emission_texture, on_texture(at));
+          material_.emission *
+          sample_texture(*material_.emission_texture, on_texture(at), material_.emission_wrap);
       range.mean += glm::dvec3(light);
       range.low = glm::min(range.low, light);
       range.high = glm::max(range.high, light);

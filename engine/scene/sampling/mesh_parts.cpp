@@ -24,6 +24,7 @@ MeshTriangle triangle_of(const Mesh& mesh, std::size_t index) {
     triangle.positions[k] = mesh.positions[vertex];
     if (!mesh.normals.empty()) triangle.normals[k] = mesh.normals[vertex];
     if (!mesh.uvs.empty()) triangle.uvs[k] = mesh.uvs[vertex];
+    if (!mesh.colours.empty()) triangle.colours[k] = mesh.colours[vertex];
   }
   return triangle;
 }
@@ -75,6 +76,7 @@ void MeshParts::add(Mesh mesh) {
   if (mesh.triangles.empty()) return;
   has_normals_ |= !mesh.normals.empty();
   has_uvs_ |= !mesh.uvs.empty();
+  has_colours_ |= !mesh.colours.empty();
   const glm::dvec3 origin = mesh.origin;
   const Bounds bounds = mesh.bounds();
   const std::vector<Material> materials = mesh.materials;
@@ -84,6 +86,7 @@ void MeshParts::add(Mesh mesh) {
 void MeshParts::add(std::shared_ptr<const SpilledMesh> mesh) {
   has_normals_ |= mesh->has_normals();
   has_uvs_ |= mesh->has_uvs();
+  has_colours_ |= mesh->has_colours();
   const SpilledMesh& of = *mesh;
   add({.spilled = std::move(mesh)}, of.origin(), of.bounds(), of.materials());
 }
@@ -91,7 +94,8 @@ void MeshParts::add(std::shared_ptr<const SpilledMesh> mesh) {
 std::uint64_t bytes_of(const Mesh& mesh) noexcept {
   constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
                           kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
-  return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex;
+  return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex +
+         mesh.colours.size() * sizeof(glm::vec3);
 }
 
 std::uint64_t texture_bytes(const std::vector<Material>& materials) {

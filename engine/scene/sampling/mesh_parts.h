@@ -32,6 +32,7 @@ class MeshParts {
   [[nodiscard]] const std::vector<Material>& materials() const noexcept { return materials_; }
   [[nodiscard]] bool has_normals() const noexcept { return has_normals_; }
   [[nodiscard]] bool has_uvs() const noexcept { return has_uvs_; }
+  [[nodiscard]] bool has_colours() const noexcept { return has_colours_; }
   /// Memory of the meshes in memory, bytes, without textures. While triangles are read there are
   /// SpilledMesh::kBytes more.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
@@ -53,7 +54,7 @@ class MeshParts {
   glm::dvec3 origin_{0};
   Bounds bounds_;
   std::vector<Material> materials_;
-  bool has_normals_ = false, has_uvs_ = false;
+  bool has_normals_ = false, has_uvs_ = false, has_colours_ = false;
 };
 
 /// What must be known of a surface before it is sampled.

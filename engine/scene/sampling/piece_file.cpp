@@ -53,6 +53,7 @@ void PieceFile::move_fields(AnyRow& row, const Move& move) const {
   move(row.triangle.positions.data(), sizeof row.triangle.positions);
   if (parts_.has_uvs()) move(row.triangle.uvs.data(), sizeof row.triangle.uvs);
   if (parts_.has_normals()) move(row.triangle.normals.data(), sizeof row.triangle.normals);
+  if (parts_.has_colours()) move(row.triangle.colours.data(), sizeof row.triangle.colours);
 }
 
 void PieceFile::pack(const Row& row, std::byte* to) const noexcept {
@@ -253,6 +254,8 @@ class PieceFile::LocalMesh {
       mesh_.normals.insert(mesh_.normals.end(), triangle.normals.begin(), triangle.normals.end());
     if (parts_.has_uvs())
       mesh_.uvs.insert(mesh_.uvs.end(), triangle.uvs.begin(), triangle.uvs.end());
+    if (parts_.has_colours())
+      mesh_.colours.insert(mesh_.colours.end(), triangle.colours.begin(), triangle.colours.end());
     mesh_.triangles.push_back({vertex, vertex + 1, vertex + 2});
     mesh_.material_of.push_back(material(triangle.material));
     return index;
@@ -267,6 +270,7 @@ class PieceFile::LocalMesh {
       if (mesh_.positions[vertex] != triangle.positions[k]) return false;
       if (parts_.has_uvs() && mesh_.uvs[vertex] != triangle.uvs[k]) return false;
       if (parts_.has_normals() && mesh_.normals[vertex] != triangle.normals[k]) return false;
+      if (parts_.has_colours() && mesh_.colours[vertex] != triangle.colours[k]) return false;
     }
     return mesh_.material_of[index] == materials_.at(triangle.material);
   }

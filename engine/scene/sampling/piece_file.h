@@ -28,7 +28,7 @@ struct PieceSortOptions {
 /// The pieces of meshes in a temporary file, and the patches that they make up.
 ///
 ///     triangles    -> cut_into_pieces() -> sorts by place on the curve -> one file of rows
-///     rows         | path, material | positions | uvs | normals |
+///     rows         | path, material | positions | uvs | normals | colours |
 ///     patches      |----------------|--------------|--          pieces that follow one another
 ///     blocks       |---|---|---|---|---|---|---|---|---|        kBlockPieces each, with a box
 ///
