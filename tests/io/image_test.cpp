@@ -260,14 +260,14 @@ TEST_CASE("image: an HDR with empty runs or with two different sizes is refused,
 }
 
 TEST_CASE("png: texts that unpack to much memory are passed over", "[io][image]") {
-  // zTXt chunks between header and pixels: 4 MB of zeros each
+  // zTXt chunks between header and pixels: 4 MB each
   const test::TemporaryDirectory scratch;
   write_png(scratch.path() / "a.png", gradient());
   const std::string whole = slurp(scratch.path() / "a.png");
   std::vector<Bytef> packed(1 << 16);
   uLongf size = packed.size();
-  const std::vector<Bytef> zeros(4'000'000);
-  REQUIRE(compress(packed.data(), &size, zeros.data(), zeros.size()) == Z_OK);
+  const std::vector<Bytef> text(4'000'000, 'x');
+  REQUIRE(compress(packed.data(), &size, text.data(), text.size()) == Z_OK);
   const std::string body = "zTXt" + std::string("a\0\0", 3) +
                            std::string(reinterpret_cast<const char*>(packed.data()), size);
   const auto big = [](std::uint32_t v) {
