@@ -53,6 +53,13 @@ class Caps(ProgramTest):
         self.assertIn("the meshes do not fit in memory", said)
         self.succeed("ptcverify", self.here / "o.ptcx")
 
+    def test_128_mib_are_enough_for_any_number_of_threads(self):
+        mesh = self.here / "small.ply"
+        for side in (20, 70, 200):
+            self.write_waves(mesh, side)
+            for threads in (1, 2, 3, 16):
+                self.peak(0, 128, "ptcbuild", mesh, "--points", "2k", "--threads", threads, "-o", self.here / "o.ptcx")
+
     def test_large_pictures_are_written_row_by_row(self):
         picture = ["--size", "2400x1600", "--samples", "1", "-o", self.here / "o.exr", "-o", self.here / "o.png"]
         for scene, cap in (([self.cloud], 224), ([self.mesh, "--points", "3k"], 160)):

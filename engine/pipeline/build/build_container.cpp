@@ -328,8 +328,11 @@ class Build {
       charge_mesh(budget, lit->mesh, &lit->rays);
       const std::uint64_t fixed =
           sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count, 0);
+      const std::uint64_t writers =
+          ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()) -
+          ContainerWriter::writing_bytes(request_.page_shift, 1);
       room.at_once = static_cast<unsigned>(std::clamp<std::uint64_t>(
-          sampling_room(budget, fixed) / kSampledPatchBytes, 1, executor_.threads()));
+          sampling_room(budget, fixed + writers) / kSampledPatchBytes, 1, executor_.threads()));
       budget.charge("sampling", fixed + room.at_once * kSampledPatchBytes);
     }
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
