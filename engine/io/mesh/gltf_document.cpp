@@ -269,6 +269,16 @@ std::size_t GltfDocument::count(const char* array) const {
   return found->size();
 }
 
+const GltfDocument::Json* GltfDocument::member(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found == object.end() || !found->is_object() ? nullptr : &*found;
+}
+
+const GltfDocument::Json* GltfDocument::extension(const Json& object, const char* name) {
+  const Json* const extensions = member(object, "extensions");
+  return extensions == nullptr ? nullptr : member(*extensions, name);
+}
+
 const GltfDocument::Json& GltfDocument::at(const char* array, std::uint64_t index) const {
   if (index >= count(array)) fail(std::string(array) + " has no entry " + std::to_string(index));
   const Json& entry = root_[array][index];

@@ -43,6 +43,11 @@ class GltfDocument {
   /// Returns the JSON of the document.
   [[nodiscard]] const Json& root() const noexcept { return root_; }
 
+  /// Returns the object object[key], or null.
+  [[nodiscard]] static const Json* member(const Json& object, const char* key);
+  /// Returns an extension of an object, or null.
+  [[nodiscard]] static const Json* extension(const Json& object, const char* name);
+
   /// Refuses the file. @throws DataError "PATH: RULE"
   [[noreturn]] void fail(const std::string& rule) const;
 

@@ -12,8 +12,6 @@
 // vertices is bounded in terms of the size of the files.
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
 #include <set>
 #include <utility>
 
@@ -24,6 +22,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/mesh/gltf_document.h"
+#include "engine/io/mesh/gltf_materials.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -57,41 +56,14 @@ constexpr std::array<std::string_view, 14> kKnownExtensions = {
     "KHR_lights_punctual",
     "EXT_texture_webp"};
 
-// Returns the object object[key], or null.
-const Json* member(const Json& object, const char* key) {
-  const auto found = object.find(key);
-  return found == object.end() || !found->is_object() ? nullptr : &*found;
-}
-
-// Returns an extension of an object, or null.
-const Json* extension(const Json& object, const char* name) {
-  const Json* const extensions = member(object, "extensions");
-  return extensions == nullptr ? nullptr : member(*extensions, name);
-}
-
-// How a texture lies on a surface.
-struct TexturePlace {
-  std::uint64_t uv_set = 0;  // N of the attribute TEXCOORD_N
-  glm::dvec2 offset{0};
-  glm::dvec2 scale{1};
-  double rotation = 0;
-
-  bool operator==(const TexturePlace&) const = default;
-};
-
-// A material of the file, and how its textures lie on it.
-struct GltfMaterial {
-  std::size_t index = 0;  // of the material in the soup
-  TexturePlace place;
-};
-
 class GltfMesh {
  public:
   GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
       : document_(path, room.memory_bytes),
         soup_(path, {room.memory_bytes - std::min(room.memory_bytes, document_.json_bytes()),
                      room.temp_directory}),
-        textures_(path.parent_path(), warnings_, room.textures) {}
+        textures_(path.parent_path(), warnings_, room.textures),
+        materials_(document_, soup_, textures_, warnings_) {}
 
   MeshFile read() {
     check_extensions();
@@ -213,14 +185,14 @@ class GltfMesh {
     const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
     if (mode < 4) return;  // points and lines
     if (mode > 6) document_.fail("the mode of a primitive is unknown");
-    if (extension(primitive, "KHR_draco_mesh_compression") != nullptr) {
+    if (GltfDocument::extension(primitive, "KHR_draco_mesh_compression") != nullptr) {
       document_.fail("Draco-compressed meshes are not supported");
     }
-    const Json* const attributes = member(primitive, "attributes");
+    const Json* const attributes = GltfDocument::member(primitive, "attributes");
     const auto position =
         attributes == nullptr ? std::nullopt : document_.unsigned_at(*attributes, "POSITION");
     if (!position) return;
-    const GltfMaterial& material = use_material(document_.unsigned_at(primitive, "material"));
+    const GltfMaterial& material = materials_.use(document_.unsigned_at(primitive, "material"));
     const std::uint64_t base = soup_.positions.size();
     const std::uint64_t count = add_vertices(*attributes, *position, material, world);
     add_triangles(primitive, mode, base, count, material, mirrors(world));
@@ -333,161 +305,10 @@ class GltfMesh {
     });
   }
 
-  // Returns a material of the file, or the default one, and adds it to the soup on first use.
-  const GltfMaterial& use_material(std::optional<std::uint64_t> index) {
-    const std::uint64_t key = index.value_or(std::numeric_limits<std::uint64_t>::max());
-    const auto known = materials_.find(key);
-    if (known != materials_.end()) return known->second;
-    GltfMaterial& made = materials_[key];
-    Material material;
-    material.albedo = glm::vec3(1);
-    if (index) read_material(document_.at("materials", *index), material, made);
-    made.index = soup_.add_material(std::move(material));
-    return made;
-  }
-
-  void read_material(const Json& json, Material& material, GltfMaterial& made) {
-    const auto title = json.find("name");
-    if (title != json.end() && title->is_string()) material.name = title->get<std::string>();
-    const auto sides = json.find("doubleSided");
-    material.double_sided = sides != json.end() && sides->is_boolean() && sides->get<bool>();
-    const auto alpha = json.find("alphaMode");
-    if (alpha != json.end() && alpha->is_string() && *alpha != "OPAQUE")
-      warnings_.add(kAlphaLeftOut, "'" + material.name + "' (" + alpha->get<std::string>() + ")");
-    if (const Json* const old = extension(json, "KHR_materials_pbrSpecularGlossiness")) {
-      read_base(*old, "diffuseFactor", "diffuseTexture", material, made);
-    } else if (const Json* const pbr = member(json, "pbrMetallicRoughness")) {
-      read_base(*pbr, "baseColorFactor", "baseColorTexture", material, made);
-    }
-    read_emission(json, material, made);
-  }
-
-  void read_base(const Json& json, const char* factor, const char* texture, Material& material,
-                 GltfMaterial& made) {
-    if (const auto colour = document_.numbers_at<4>(json, factor)) {
-      for (int i = 0; i < 3; ++i) {
-        material.albedo[i] =
-            static_cast<float>(std::clamp((*colour)[static_cast<std::size_t>(i)], 0.0, 1.0));
-      }
-    }
-    const Json* const info = member(json, texture);
-    if (info == nullptr) return;
-    material.texture = load_texture(*info);
-    material.wrap = wrap_of(*info);
-    made.place = place_of(*info);
-  }
-
-  // Reads which texture coordinates a texture has, and how they are transformed.
-  [[nodiscard]] TexturePlace place_of(const Json& info) const {
-    TexturePlace place{.uv_set = document_.unsigned_at(info, "texCoord").value_or(0)};
-    const Json* const transform = extension(info, "KHR_texture_transform");
-    if (transform == nullptr) return place;
-    place.uv_set = document_.unsigned_at(*transform, "texCoord").value_or(place.uv_set);
-    place.rotation = document_.number_at(*transform, "rotation", 0);
-    if (const auto o = document_.numbers_at<2>(*transform, "offset"))
-      place.offset = {(*o)[0], (*o)[1]};
-    if (const auto s = document_.numbers_at<2>(*transform, "scale"))
-      place.scale = {(*s)[0], (*s)[1]};
-    return place;
-  }
-
-  // Reads how a texture goes on beyond its borders.
-  [[nodiscard]] TextureWrap wrap_of(const Json& info) const {
-    const auto texture = document_.unsigned_at(info, "index");
-    const auto sampler = texture
-                             ? document_.unsigned_at(document_.at("textures", *texture), "sampler")
-                             : std::nullopt;
-    if (!sampler) return {};
-    const Json& json = document_.at("samplers", *sampler);
-    const auto wrap = [&](const char* key) {
-      constexpr std::uint64_t kClamp = 33071, kMirror = 33648, kRepeat = 10497;
-      const std::uint64_t value = document_.unsigned_at(json, key).value_or(kRepeat);
-      return value == kClamp ? Wrap::clamp : value == kMirror ? Wrap::mirror : Wrap::repeat;
-    };
-    return {wrap("wrapS"), wrap("wrapT")};
-  }
-
-  // Reads the emission. A mesh has one set of texture coordinates: where the emission texture lies
-  // on another than that of the base colour, it is replaced by its mean, so that the emitted power
-  // is right.
-  void read_emission(const Json& json, Material& material, GltfMaterial& made) {
-    const auto factor = document_.numbers_at<3>(json, "emissiveFactor");
-    if (!factor) return;
-    double strength = 1;
-    if (const Json* const e = extension(json, "KHR_materials_emissive_strength")) {
-      strength = document_.number_at(*e, "emissiveStrength", 1);
-    }
-    glm::dvec3 mean(1);
-    const Json* const info = member(json, "emissiveTexture");
-    const auto image = info == nullptr ? nullptr : load_texture(*info);
-    if (image && (!material.texture || place_of(*info) == made.place)) {
-      material.emission_texture = image;
-      material.emission_wrap = wrap_of(*info);
-      made.place = place_of(*info);
-    } else if (image) {
-      mean = mean_of(image);
-      warnings_.add(kEmissionAveraged, "material '" + material.name +
-                                           "', whose base colour lies on other coordinates");
-    }
-    for (int i = 0; i < 3; ++i) {
-      const double value = (*factor)[static_cast<std::size_t>(i)] * strength * mean[i];
-      material.emission[i] =
-          static_cast<float>(std::clamp<double>(value, 0, std::numeric_limits<float>::max()));
-    }
-  }
-
-  // Returns the mean of a texture; it is kept, because many materials may share one.
-  glm::dvec3 mean_of(const std::shared_ptr<const Texture>& image) {
-    const auto [at, is_new] = means_.try_emplace(image, 0);
-    if (is_new) {
-      image->visit_rows([&sum = at->second](std::span<const glm::vec3> row) {
-        for (const glm::vec3& pixel : row) sum += glm::dvec3(pixel);
-      });
-      at->second /= static_cast<double>(image->size());
-    }
-    return at->second;
-  }
-
-  std::shared_ptr<const Texture> load_texture(const Json& info) {
-    const auto texture = document_.unsigned_at(info, "index");
-    if (!texture) document_.fail("a texture has no index");
-    const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
-    if (!source) {
-      if (textures_left_out_.insert(*texture).second) {
-        warnings_.add(kTextureLeftOut,
-                      "texture " + std::to_string(*texture) + ": it has no supported source");
-      }
-      return nullptr;
-    }
-    const auto [at, is_new] = images_.try_emplace(*source);
-    if (is_new) at->second = load_image(*source);
-    return at->second;
-  }
-
-  // Loads an image. Several images that are one file or one bufferView are loaded once.
-  std::shared_ptr<const Texture> load_image(std::uint64_t source) {
-    const Json& image = document_.at("images", source);
-    const auto uri = image.find("uri");
-    const std::string label = "image " + std::to_string(source);
-    if (uri != image.end() && uri->is_string()) {
-      const std::string text = uri->get<std::string>();
-      if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text));
-      const std::vector<std::byte> bytes = document_.decode_uri(text);
-      return textures_.decode(label, ByteRange(bytes), document_.bytes_read());
-    }
-    const auto view = document_.unsigned_at(image, "bufferView");
-    if (!view) document_.fail("an image has neither uri nor bufferView");
-    const auto [at, is_new] = image_of_view_.try_emplace(*view);
-    if (is_new) {
-      const ByteRange bytes = document_.view(*view);
-      at->second = textures_.decode(label, bytes, document_.bytes_read());
-    }
-    return at->second;
-  }
-
   // Adds a perspective camera, which looks along -z with y up (section 3.10).
   void add_camera(std::uint64_t index, const glm::dmat4& world) {
-    const Json* const perspective = member(document_.at("cameras", index), "perspective");
+    const Json* const perspective =
+        GltfDocument::member(document_.at("cameras", index), "perspective");
     if (perspective == nullptr) return;
     const double vertical = document_.number_at(*perspective, "yfov", 0.7);
     const double aspect = document_.number_at(*perspective, "aspectRatio", 16.0 / 9);
@@ -506,14 +327,10 @@ class GltfMesh {
   std::vector<MeshCamera> cameras_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::map<std::uint64_t, GltfMaterial> materials_;                        // by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Texture>> images_;         // by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Texture>> image_of_view_;  // by index of bufferView
-  std::map<std::shared_ptr<const Texture>, glm::dvec3> means_;
-  std::set<std::uint64_t> textures_left_out_;  // indices in the file
-  std::set<std::uint64_t> cameras_left_out_;   // indices in the file
-  std::vector<bool> visited_;                  // per node
-  bool has_uvs_ = false;                       // some primitive has texture coordinates
+  GltfMaterials materials_;
+  std::set<std::uint64_t> cameras_left_out_;  // indices in the file
+  std::vector<bool> visited_;                 // per node
+  bool has_uvs_ = false;                      // some primitive has texture coordinates
 };
 
 }  // namespace
