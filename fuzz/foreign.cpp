@@ -69,6 +69,12 @@ void read_mesh_file(const Path& path) {
     require(is_finite(material.albedo) && is_finite(material.emission));
     if (material.texture) check(*material.texture);
   }
+  for (const MeshLight& light : file.lights) {
+    require(is_finite(light.position) && is_unit(light.direction) && is_finite(light.intensity));
+    require(std::min({light.intensity.x, light.intensity.y, light.intensity.z}) >= 0);
+    require(light.inner_angle >= 0 && light.inner_angle <= light.outer_angle &&
+            light.outer_angle > 0 && light.outer_angle < 1.5708F);
+  }
   for (const MeshCamera& camera : file.cameras) {
     require(is_finite(camera.position) && is_unit(camera.forward) && is_unit(camera.up));
     require(camera.horizontal_fov > 0 && camera.horizontal_fov < 3.1416F);

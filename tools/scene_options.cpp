@@ -52,7 +52,6 @@ glm::vec3 parse_colour(const std::string& option, const std::string& text) {
 
 /// The luminous flux of 1 W of light of 555 nm, lm: the definition of the candela, and what
 /// Blender's glTF exporter takes for all light.
-constexpr double kLumensPerWatt = 683;
 
 /// Factors from a unit to the one that a light is kept in, by name; "" is for numbers without one.
 using Units = std::map<std::string_view, double>;

@@ -432,7 +432,7 @@ TEST_CASE("gltf: samplers say how textures go on, and what is not understood is 
   json["textures"] = Json::parse(R"([{"source": 0, "sampler": 0}, {"source": 0, "sampler": 1}])");
   json["samplers"] = Json::parse(R"([{"wrapS": 33071, "wrapT": 33648}, {"wrapT": 10497}])");
   json["images"] = Json::parse(R"([{"uri": "t.png"}])");
-  json["extensionsUsed"] = {"KHR_texture_transform", "KHR_lights_punctual", "EXT_new"};
+  json["extensionsUsed"] = {"KHR_texture_transform", "KHR_materials_volume", "EXT_new"};
   Json& primitive = json["meshes"][0]["primitives"][0];
   primitive["material"] = 0;
   primitive["attributes"]["TEXCOORD_0"] = 2;
@@ -443,9 +443,49 @@ TEST_CASE("gltf: samplers say how textures go on, and what is not understood is 
   REQUIRE(file.warnings.size() == 2);
   CHECK(file.warnings[0] ==
         "a material is solid, because its transparency is left out: 'leaf' (MASK)");
-  CHECK(file.warnings[1] == "2 extensions of glTF are left out: KHR_lights_punctual; EXT_new");
+  CHECK(file.warnings[1] == "2 extensions of glTF are left out: KHR_materials_volume; EXT_new");
   json["textures"][0]["sampler"] = 2;
   CHECK_FALSE(files.fault(json).empty());
+}
+
+TEST_CASE("gltf: lights stand and shine as their nodes do", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["extensions"]["KHR_lights_punctual"]["lights"] = Json::parse(R"([
+    {"type": "directional", "intensity": 1000, "color": [1, 0.5, 0]},
+    {"type": "point", "intensity": 20, "range": 5},
+    {"type": "spot", "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.5}},
+    {"type": "spot", "spot": {"innerConeAngle": 3, "outerConeAngle": 2}}])");
+  const auto node = [](int light) {
+    return Json{{"translation", {1, 2, 3}},
+                {"scale", {2, 2, 2}},
+                {"rotation", {-0.70710678118654752, 0, 0, 0.70710678118654752}},  // -z goes to -y
+                {"extensions", {{"KHR_lights_punctual", {{"light", light}}}}}};
+  };
+  for (int i = 0; i < 4; ++i) json["nodes"].push_back(node(i));
+  json["scenes"][0]["nodes"] = {0, 1, 2, 3, 4};
+  const MeshFile file = files.read(json);
+  REQUIRE(file.lights.size() == 4);
+  CHECK(file.warnings.empty());
+  CHECK(file.lights[0].kind == MeshLight::Kind::sun);
+  CHECK(file.lights[0].intensity == glm::vec3(1000, 500, 0));
+  CHECK(glm::distance(file.lights[0].direction, glm::vec3(0, -1, 0)) < 1e-6F);
+  CHECK(file.lights[1].kind == MeshLight::Kind::point);
+  CHECK(file.lights[1].position == glm::dvec3(1, 2, 3));
+  CHECK(file.lights[1].intensity == glm::vec3(20));
+  CHECK(file.lights[2].kind == MeshLight::Kind::spot);
+  CHECK(file.lights[2].inner_angle == 0.2F);
+  CHECK(file.lights[2].outer_angle == 0.5F);
+  CHECK(file.lights[3].outer_angle < 1.5708F);
+  CHECK(file.lights[3].inner_angle <= file.lights[3].outer_angle);
+
+  json["nodes"][1] = node(4);
+  CHECK_THAT(files.fault(json), Contains("a node shows a light that does not exist"));
+  json["nodes"][1] = node(1);
+  json["extensions"]["KHR_lights_punctual"]["lights"][1]["type"] = "area";
+  CHECK_THAT(files.fault(json), Contains("neither directional, point nor spot"));
+  json.erase("extensions");
+  CHECK_THAT(files.fault(json), Contains("a node shows a light that does not exist"));
 }
 
 TEST_CASE("gltf: cameras look along -z of their node", "[io][gltf]") {

@@ -80,6 +80,16 @@ struct MeshCamera {
   float horizontal_fov = 0.8f;  ///< radians
 };
 
+/// A light that a mesh file defines: one of glTF's KHR_lights_punctual.
+struct MeshLight {
+  enum class Kind { sun, point, spot } kind = Kind::point;
+  glm::dvec3 position{0};          ///< world coordinates; unused by a sun
+  glm::vec3 direction{0, 0, -1};   ///< unit; from the light on; unused by a point
+  glm::vec3 intensity{1};          ///< linear RGB: lux of a sun, else candela
+  float inner_angle = 0;           ///< of a spot: radians, from its axis; at most `outer_angle`
+  float outer_angle = 0.7853982f;  ///< of a spot: radians, from its axis; above 0, at most pi / 2
+};
+
 class SpilledMesh;
 
 /// The memory in which a mesh is read, and where one goes that takes more.
@@ -98,6 +108,7 @@ struct MeshFile {
   /// The mesh in place of `mesh`, where that would take more memory than it may (spilled_mesh.h).
   std::shared_ptr<const SpilledMesh> spilled;
   std::vector<MeshCamera> cameras;  ///< world coordinates
+  std::vector<MeshLight> lights;    ///< world coordinates
   /// The warnings about parts that were left out or replaced: one line for each kind, without the
   /// name of the file.
   std::vector<std::string> warnings;

@@ -1,7 +1,7 @@
-// Reads meshes, materials and cameras from glTF 2.0.
+// Reads meshes, materials, cameras and lights from glTF 2.0.
 //
 //   scene --> node --> node ...            transforms multiply on the way down
-//              |  `--> camera
+//              |  `--> camera, light
 //              v
 //             mesh --> primitive --> accessors (positions, normals, texture coordinates, indices)
 //                          `--> material --> texture --> image
@@ -12,6 +12,7 @@
 // vertices is bounded in terms of the size of the files.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <utility>
 
@@ -32,11 +33,12 @@ using Corner = MeshSoup::Corner;
 using Json = GltfDocument::Json;
 
 // The extensions that are understood; others are told. Pictures in WebP have warnings of their own.
-constexpr std::array<std::string_view, 6> kUnderstood = {"KHR_materials_emissive_strength",
+constexpr std::array<std::string_view, 7> kUnderstood = {"KHR_materials_emissive_strength",
                                                          "KHR_materials_pbrSpecularGlossiness",
                                                          "KHR_materials_unlit",
                                                          "KHR_mesh_quantization",
                                                          "KHR_texture_transform",
+                                                         "KHR_lights_punctual",
                                                          "EXT_texture_webp"};
 // The extensions that a file may require: each is either understood or can be left out with little
 // harm.
@@ -56,6 +58,8 @@ constexpr std::array<std::string_view, 14> kKnownExtensions = {
     "KHR_lights_punctual",
     "EXT_texture_webp"};
 
+constexpr char kLights[] = "KHR_lights_punctual";
+
 class GltfMesh {
  public:
   GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
@@ -74,7 +78,9 @@ class GltfMesh {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }
     warn_of_extensions();
-    return mesh_file(std::move(soup_), std::move(cameras_), warnings_.lines());
+    MeshFile file = mesh_file(std::move(soup_), std::move(cameras_), warnings_.lines());
+    file.lights = std::move(lights_);
+    return file;
   }
 
  private:
@@ -150,6 +156,8 @@ class GltfMesh {
       const glm::dmat4 world = parent * local_transform(node);
       if (const auto mesh = document_.unsigned_at(node, "mesh")) add_mesh(*mesh, world);
       if (const auto camera = document_.unsigned_at(node, "camera")) add_camera(*camera, world);
+      if (const Json* const light = GltfDocument::extension(node, kLights))
+        add_light(*light, world);
       push(node_list(node, "children"), world);
     }
   }
@@ -322,9 +330,61 @@ class GltfMesh {
     }
   }
 
+  // Adds a light, which shines along -z. Its range is left out, since light has no end.
+  // Source: Khronos, KHR_lights_punctual.
+  void add_light(const Json& of_node, const glm::dmat4& world) {
+    const Json* const all = GltfDocument::extension(document_.root(), kLights);
+    const auto index = document_.unsigned_at(of_node, "light");
+    const auto list = all == nullptr ? Json::const_iterator() : all->find("lights");
+    if (!index || all == nullptr || list == all->end() || !list->is_array() ||
+        *index >= list->size() || !(*list)[*index].is_object()) {
+      document_.fail("a node shows a light that does not exist");
+    }
+    const Json& json = (*list)[*index];
+    const auto type = json.find("type");
+    MeshLight light{.position = glm::dvec3(world[3])};
+    if (type != json.end() && *type == "directional") {
+      light.kind = MeshLight::Kind::sun;
+    } else if (type != json.end() && *type == "spot") {
+      light.kind = MeshLight::Kind::spot;
+      set_cone(json, light);
+    } else if (type == json.end() || *type != "point") {
+      document_.fail("a light is neither directional, point nor spot");
+    }
+    const auto colour = document_.numbers_at<3>(json, "color").value_or(std::array{1.0, 1.0, 1.0});
+    const double intensity = document_.number_at(json, "intensity", 1);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double value = colour[i] * intensity;
+      light.intensity[static_cast<int>(i)] =
+          static_cast<float>(std::clamp<double>(value, 0, std::numeric_limits<float>::max()));
+    }
+    const glm::dvec3 axis = -glm::dvec3(world[2]);
+    const double length = glm::length(axis);
+    const bool aims = std::isfinite(length) && length > 0;
+    const glm::dvec3& p = light.position;
+    if (!std::isfinite(p.x + p.y + p.z) || (!aims && light.kind != MeshLight::Kind::point)) {
+      warnings_.add(kLightLeftOut, "light " + std::to_string(*index));
+      return;
+    }
+    if (aims) light.direction = glm::vec3(axis / length);
+    lights_.push_back(light);
+  }
+
+  void set_cone(const Json& json, MeshLight& light) const {
+    const auto spot = json.find("spot");
+    if (spot == json.end() || !spot->is_object()) return;
+    constexpr double kLeast = 1e-4, kMost = 1.5707963;
+    const double outer =
+        std::clamp(document_.number_at(*spot, "outerConeAngle", 0.7853981633974483), kLeast, kMost);
+    light.outer_angle = static_cast<float>(outer);
+    light.inner_angle =
+        static_cast<float>(std::clamp(document_.number_at(*spot, "innerConeAngle", 0), 0.0, outer));
+  }
+
   GltfDocument document_;
   MeshSoup soup_;
   std::vector<MeshCamera> cameras_;
+  std::vector<MeshLight> lights_;
   MeshWarnings warnings_;
   TextureLoader textures_;
   GltfMaterials materials_;

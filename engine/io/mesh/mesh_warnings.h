@@ -43,6 +43,9 @@ inline constexpr WarningKind kExtensionLeftOut{"an extension of glTF is left out
 inline constexpr WarningKind kSkinLeftOut{
     "a skin is left out and its mesh keeps the pose in which it is stored",
     "skins are left out and their meshes keep the pose in which they are stored"};
+inline constexpr WarningKind kLightLeftOut{
+    "a light is left out because it has no place or no direction",
+    "lights are left out because they have no place or no direction"};
 inline constexpr WarningKind kCameraLeftOut{
     "a camera is left out because it has no direction or no field of view",
     "cameras are left out because they have no direction or no field of view"};

@@ -65,9 +65,9 @@ struct BuildRequest {
   std::string up;
   bool remove_duplicates = false;  ///< of points at one position keeps the first
   bool backdrop = false;           ///< sets the meshes on a ground in front of a red wall
-  /// Lights of the meshes, and the sky that lights what is shaded later. Empty: default_rig() for
-  /// meshes, but no lights at all when one of them emits light; cloud_rig() for clouds without
-  /// radiance alone.
+  /// Lights of the meshes, and the sky that lights what is shaded later. Empty: those that
+  /// files of meshes define, else default_rig() for meshes, but no lights at all when one of them
+  /// emits light; cloud_rig() for clouds without radiance alone.
   std::optional<LightRig> lights;
   SamplingOptions sampling;            ///< how densely meshes are sampled, and with how many rays
   BuildOptions tree;                   ///< the octree's leaves and the order of its pages

@@ -287,6 +287,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     inputs.lights = *request.lights;
   } else if (const std::string& lights = inputs.clouds.text[kLightsKey]; !lights.empty()) {
     inputs.lights = light_rig_from_json(lights);
+  } else if (!meshes.lights.empty()) {
+    inputs.lights = rig_of(meshes.lights);
   } else if (inputs.clouds.unlit) {
     inputs.lights = cloud_rig(up_of(inputs.clouds.text));
   }
@@ -305,7 +307,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
     load_recorded_sky(request, inputs, limits);
-  } else if (!request.lights && !inputs.emitters) {
+  } else if (!request.lights && !inputs.emitters && meshes.lights.empty()) {
     inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
   if (inputs.streamed) {

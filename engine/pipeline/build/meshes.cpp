@@ -133,12 +133,14 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
                          std::vector<MeshCamera>* cameras, const char* field) {
   // Read the mesh files
   Joiner joiner(limits, field);
+  std::vector<MeshLight> lights;
   for (const std::filesystem::path& input : inputs) {
     if (holds_points(input)) continue;
     MeshFile file = read_mesh(input, joiner.room());
     for (const std::string& warning : file.warnings) {
       progress.note(input.string() + ": " + warning);
     }
+    lights.insert(lights.end(), file.lights.begin(), file.lights.end());
     if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
     if (file.spilled) {
       joiner.add(std::move(file.spilled));
@@ -152,7 +154,9 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
     check_mesh(*also);
     joiner.add(Mesh(*also));
   }
-  return joiner.take(backdrop);
+  LoadedMeshes loaded = joiner.take(backdrop);
+  loaded.lights = std::move(lights);
+  return loaded;
 }
 
 Bounds bounds_before_backdrop(const Mesh& mesh) {

@@ -30,6 +30,7 @@ struct MeshLimits {
 struct LoadedMeshes {
   Mesh mesh;  ///< all of them, joined; without triangles when there is none, or when `parts` has
               ///< them
+  std::vector<MeshLight> lights;     ///< of the files, in their order
   std::unique_ptr<MeshParts> parts;  ///< all of them, where they do not fit in memory; else null
 
   [[nodiscard]] bool empty() const noexcept { return mesh.triangles.empty() && !parts; }

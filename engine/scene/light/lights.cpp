@@ -153,6 +153,30 @@ LightRig default_rig(const glm::vec3& up) {
   return rig;
 }
 
+LightRig rig_of(std::span<const MeshLight> lights) {
+  LightRig rig;
+  for (const MeshLight& light : lights) {
+    const glm::vec3 intensity = light.intensity / static_cast<float>(kLumensPerWatt);
+    switch (light.kind) {
+      case MeshLight::Kind::sun:
+        rig.suns.push_back(
+            {.to_sun = -light.direction, .irradiance = intensity, .angular_radius = 0});
+        break;
+      case MeshLight::Kind::point:
+        rig.points.push_back({.position = light.position, .intensity = intensity});
+        break;
+      case MeshLight::Kind::spot:
+        rig.spots.push_back({.position = light.position,
+                             .direction = light.direction,
+                             .intensity = intensity,
+                             .inner_angle = light.inner_angle,
+                             .outer_angle = light.outer_angle});
+        break;
+    }
+  }
+  return rig;
+}
+
 LightRig cloud_rig(const glm::vec3& up) {
   LightRig rig;
   rig.sky = {.radiance = glm::vec3(1), .up = up};

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/io/image/texture.h"
+#include "engine/io/mesh/mesh.h"
 
 namespace ptc {
 
@@ -135,6 +137,13 @@ void check_lights(const LightRig& rig);
 /// Returns the lights for a scene that brings none of its own: a sun and a bluish sky.
 /// @param up  the axis that points up
 [[nodiscard]] LightRig default_rig(const glm::vec3& up = {0, 1, 0});
+
+/// Lumens that count as 1 W: the luminous efficacy of light of 555 nm, which glTF's exporters take
+/// for all light.
+inline constexpr double kLumensPerWatt = 683;
+
+/// Returns the lights of mesh files, without a sky.
+[[nodiscard]] LightRig rig_of(std::span<const MeshLight> lights);
 
 /// Returns the lights of a cloud that gives no light of its own: a white sky, under which a surface
 /// that nothing covers has the colour of its albedo.
