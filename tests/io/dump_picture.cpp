@@ -10,7 +10,7 @@
 int main(int argc, char** argv) {
   try {
     const auto store =
-        argc > 2 ? ptc::TextureStore::make(4 << 20, "/tmp") : ptc::TextureStore::make();
+        argc > 2 ? ptc::TextureStore::make(16 << 20, "/tmp") : ptc::TextureStore::make();
     const auto filler = store->read(argv[argc - 1]);
     const ptc::Texture texture = store->read(argv[1]);
     std::cout << texture.width() << ' ' << texture.height() << '\n';

@@ -90,9 +90,9 @@ class Pictures(unittest.TestCase):
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory()
         self.addCleanup(self.folder.cleanup)
-        # Half of 4 MiB, but for 152 bytes
+        # Half of 16 MiB, but for 608 bytes
         self.filler = pathlib.Path(self.folder.name) / "filler.png"
-        self.filler.write_bytes(self.saved(Image.new("RGB", (1000, 699)), "PNG"))
+        self.filler.write_bytes(self.saved(Image.new("RGB", (2000, 1398)), "PNG"))
 
     def read(self, data, name):
         path = pathlib.Path(self.folder.name) / name
