@@ -332,12 +332,9 @@ std::vector<std::byte> GltfDocument::decode_uri(const std::string& uri) const {
   return std::move(*bytes);
 }
 
-void GltfDocument::Buffer::read(std::uint64_t at, std::span<std::byte> out) const {
-  if (file != nullptr) {
-    file->read_at(offset + at, out);
-  } else {
-    std::memcpy(out.data(), held.data() + at, out.size());
-  }
+ByteRange GltfDocument::Buffer::part(std::uint64_t at, std::uint64_t size) const {
+  if (file != nullptr) return {*file, offset + at, size};
+  return ByteRange(std::span(held).subspan(at, size));
 }
 
 const GltfDocument::Buffer& GltfDocument::buffer(std::uint64_t index) {
@@ -393,9 +390,7 @@ GltfDocument::View GltfDocument::find_view(std::uint64_t index) {
 
 ByteRange GltfDocument::view(std::uint64_t index) {
   const View view = find_view(index);
-  const Buffer& holder = buffer(view.buffer);
-  if (holder.file) return {*holder.file, holder.offset + view.offset, view.length};
-  return ByteRange(std::span(holder.held).subspan(view.offset, view.length));
+  return buffer(view.buffer).part(view.offset, view.length);
 }
 
 GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::size_t components,
@@ -451,7 +446,7 @@ void GltfDocument::read(const Elements& elements,
   for (std::uint64_t first = 0; first < elements.count; first += at_once) {
     const std::uint64_t count = std::min(at_once, elements.count - first);
     bytes.resize((count - 1) * elements.stride + element_bytes);
-    buffer.read(elements.offset + first * elements.stride, bytes);
+    buffer.part(elements.offset + first * elements.stride, bytes.size()).read(0, bytes);
     for (std::uint64_t i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < elements.components; ++k) {
         const double value = load(&bytes[i * elements.stride + k * component.bytes], elements.type);

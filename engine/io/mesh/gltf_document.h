@@ -108,7 +108,8 @@ class GltfDocument {
     std::uint64_t length = 0;         ///< that there is
     std::vector<std::byte> held;
 
-    void read(std::uint64_t at, std::span<std::byte> out) const;
+    /// Returns some of the bytes, which are valid as long as this.
+    [[nodiscard]] ByteRange part(std::uint64_t at, std::uint64_t size) const;
   };
   /// A buffer view, checked.
   struct View {

@@ -9,7 +9,6 @@
 
 namespace ptc {
 
-// Returns a material of the file, or the default one, and adds it to the soup on first use.
 const GltfMaterial& GltfMaterials::use(std::optional<std::uint64_t> index) {
   const std::uint64_t key = index.value_or(std::numeric_limits<std::uint64_t>::max());
   const auto known = materials_.find(key);

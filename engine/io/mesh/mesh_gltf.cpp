@@ -32,31 +32,31 @@ namespace {
 using Corner = MeshSoup::Corner;
 using Json = GltfDocument::Json;
 
-// The extensions that are understood; others are told. Pictures in WebP have warnings of their own.
-constexpr std::array<std::string_view, 7> kUnderstood = {"KHR_materials_emissive_strength",
-                                                         "KHR_materials_pbrSpecularGlossiness",
-                                                         "KHR_materials_unlit",
-                                                         "KHR_mesh_quantization",
-                                                         "KHR_texture_transform",
-                                                         "KHR_lights_punctual",
-                                                         "EXT_texture_webp"};
-// The extensions that a file may require: each is either understood or can be left out with little
-// harm.
-constexpr std::array<std::string_view, 14> kKnownExtensions = {
-    "KHR_materials_emissive_strength",
-    "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_unlit",
-    "KHR_materials_clearcoat",
-    "KHR_materials_ior",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_volume",
-    "KHR_materials_variants",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-    "KHR_lights_punctual",
-    "EXT_texture_webp"};
+// An extension that a file may require.
+struct Extension {
+  std::string_view name;
+  bool understood;  // or else it can be left out with little harm, which is told
+};
+// Pictures in WebP have warnings of their own.
+constexpr std::array<Extension, 14> kExtensions = {{{"KHR_materials_emissive_strength", true},
+                                                    {"KHR_materials_pbrSpecularGlossiness", true},
+                                                    {"KHR_materials_unlit", true},
+                                                    {"KHR_materials_clearcoat", false},
+                                                    {"KHR_materials_ior", false},
+                                                    {"KHR_materials_sheen", false},
+                                                    {"KHR_materials_specular", false},
+                                                    {"KHR_materials_transmission", false},
+                                                    {"KHR_materials_volume", false},
+                                                    {"KHR_materials_variants", false},
+                                                    {"KHR_mesh_quantization", true},
+                                                    {"KHR_texture_transform", true},
+                                                    {"KHR_lights_punctual", true},
+                                                    {"EXT_texture_webp", true}}};
+
+const Extension* find_extension(std::string_view name) {
+  const auto* const found = std::ranges::find(kExtensions, name, &Extension::name);
+  return found == kExtensions.end() ? nullptr : found;
+}
 
 constexpr char kLights[] = "KHR_lights_punctual";
 
@@ -88,7 +88,7 @@ class GltfMesh {
     for (std::size_t i = 0; i < document_.count("extensionsRequired"); ++i) {
       const Json& required = document_.root()["extensionsRequired"][i];
       const std::string text = required.is_string() ? required.get<std::string>() : "";
-      if (std::ranges::find(kKnownExtensions, text) == kKnownExtensions.end()) {
+      if (find_extension(text) == nullptr) {
         document_.fail("the extension '" + text + "' is not supported");
       }
     }
@@ -100,8 +100,8 @@ class GltfMesh {
       const Json& used = document_.root()["extensionsUsed"][i];
       if (!used.is_string()) continue;
       const std::string name = used.get<std::string>();
-      if (std::ranges::find(kUnderstood, name) == kUnderstood.end())
-        warnings_.add(kExtensionLeftOut, name);
+      const Extension* const known = find_extension(name);
+      if (known == nullptr || !known->understood) warnings_.add(kExtensionLeftOut, name);
     }
   }
 
