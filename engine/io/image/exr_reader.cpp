@@ -4,7 +4,6 @@
 // library allocates.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <exception>
 #include <new>

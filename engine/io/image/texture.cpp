@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/base/numbers.h"
 #include "engine/io/file/file.h"
 #include "engine/io/image/row_reader.h"
 
@@ -52,9 +53,7 @@ class TextureStore::Tiles {
   /// @param at    offset of the bytes in the tile
   void read(std::uint64_t tile, std::size_t bytes_of_tile, std::size_t at,
             std::span<std::byte> out) {
-    // Spread the tiles by the golden ratio
-    const std::uint64_t hash = (tile + 1) * 0x9e3779b97f4a7c15U;
-    Slot& slot = slots_[static_cast<std::size_t>((hash >> 32) * slots_.size() >> 32)];
+    Slot& slot = slots_[splitmix64(tile) % slots_.size()];
     const std::lock_guard lock(slot.mutex);
     if (slot.tile != tile + 1) {
       slot.tile = 0;
