@@ -65,7 +65,7 @@ void charge_textures(MemoryBudget& budget, const std::vector<Material>& material
 
 std::shared_ptr<TextureStore> texture_store(const RunOptions& run,
                                             const std::filesystem::path& target) {
-  return TextureStore::make(run.memory_bytes / 4, roomiest_temp_dir(run, target));
+  return TextureStore::make(texture_cap(run), roomiest_temp_dir(run, target));
 }
 
 void charge_sky(MemoryBudget& budget, const Sky& sky) {

@@ -55,7 +55,12 @@ void charge_directory(MemoryBudget& budget, const ContainerReader& container);
 /// Charges the textures of materials.
 void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials);
 
-/// Returns what reads the pictures of a run, textures or a sky, into a quarter of its cap.
+/// Returns the memory that the textures of a run may take, or its sky: a quarter of its cap.
+[[nodiscard]] constexpr std::uint64_t texture_cap(const RunOptions& run) noexcept {
+  return run.memory_bytes / 4;
+}
+
+/// Returns what reads the pictures of a run, textures or a sky, into texture_cap().
 /// @param target  as for roomiest_temp_dir()
 [[nodiscard]] std::shared_ptr<TextureStore> texture_store(const RunOptions& run,
                                                           const std::filesystem::path& target);

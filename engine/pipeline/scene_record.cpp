@@ -8,6 +8,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/pipeline/budgets.h"
 
 namespace ptc {
 
@@ -61,12 +62,13 @@ LightRig recorded_rig(const ContainerReader& container) {
   return found == text.end() ? LightRig() : light_rig_from_json(found->second);
 }
 
-LightRig recorded_lights(const ContainerReader& container, TextureStore& store,
-                         Progress& progress) {
+LightRig recorded_lights(const ContainerReader& container, const RunOptions& run,
+                         const std::filesystem::path& target, Progress& progress) {
   LightRig rig = recorded_rig(container);
   const std::string file = container.path().string();
   try {
-    if (load_sky_map(rig.sky, directory_of(container.path()), store) == SkyMap::changed) {
+    const auto store = texture_store(run, target);
+    if (load_sky_map(rig.sky, directory_of(container.path()), *store) == SkyMap::changed) {
       progress.note(file + ": the sky picture " + rig.sky.map_path +
                     " has changed since it lit the scene's surfels");
     }

@@ -10,6 +10,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/base/progress.h"
+#include "engine/pipeline/run.h"
 #include "engine/scene/light/lights.h"
 #include "engine/store/reader.h"
 
@@ -55,11 +56,13 @@ void join_texts(std::map<std::string, std::string>& text,
 
 /// Returns the lights that a container was built with, and loads the picture of their sky; no
 /// lights when the container records none.
+/// @param run       into whose texture_cap() the picture is read
+/// @param target    as for roomiest_temp_dir()
 /// @param progress  gets a note when the picture is no longer the one that was recorded
 /// @throws DataError when the record is no light rig, or names a picture that does not exist or is
 ///         damaged; std::system_error
-[[nodiscard]] LightRig recorded_lights(const ContainerReader& container, TextureStore& store,
-                                       Progress& progress);
+[[nodiscard]] LightRig recorded_lights(const ContainerReader& container, const RunOptions& run,
+                                       const std::filesystem::path& target, Progress& progress);
 
 /// Returns the text that records a rig. The path of its sky picture is made absolute.
 /// @throws RequestError when the sky has a picture and no path

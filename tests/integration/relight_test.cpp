@@ -333,7 +333,7 @@ TEST_CASE("relight: points keep all but their light, and the tree has the new on
   CHECK(scan.header().uuid != lit.header().uuid);
   CHECK(sky_is_gathered(scan));
   CHECK_FALSE(sky_is_gathered(lit));
-  CHECK(recorded_lights(lit, *TextureStore::make(), silent).suns.size() == 1);
+  CHECK(recorded_lights(lit, {}, dir / "lit.ptcx", silent).suns.size() == 1);
   const VerifyReport report =
       verify_container(dir / "lit.ptcx", {.level = VerifyLevel::rebuild}, silent);
   CHECK(report.findings.empty());

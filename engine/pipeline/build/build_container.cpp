@@ -169,7 +169,7 @@ class Build {
     // Keep the lights of the scene; without meshes to light, their sky picture is not loaded
     if (scene_->meta().text.contains(kLightsKey)) {
       request_.lights =
-          has_meshes() ? recorded_lights(*scene_, *sky_store(), progress_) : LightRig{};
+          has_meshes() ? recorded_lights(*scene_, request_.run, target_, progress_) : LightRig{};
     }
   }
 
@@ -203,10 +203,6 @@ class Build {
     return points / points_per_page(header) * (8 + 5 * groups) / 5;
   }
 
-  [[nodiscard]] std::shared_ptr<TextureStore> sky_store() const {
-    return texture_store(request_.run, target_);
-  }
-
   [[nodiscard]] MemoryBudget build_budget() const {
     MemoryBudget budget = budget_of(request_.run.memory_bytes, "this scene's build");
     if (request_.lights) charge_sky(budget, request_.lights->sky);
@@ -224,7 +220,7 @@ class Build {
     return {.reading = std::max(budget.left(), kLeast),
             .kept = room,
             .traced = std::max(sampling_room(budget, sampling), kLeast),
-            .textures = request_.run.memory_bytes / 4,
+            .textures = texture_cap(request_.run),
             .temp_directory = roomiest_temp_dir(request_.run, target_)};
   }
 
@@ -400,7 +396,7 @@ class Build {
                      " light all points; give lights to light them otherwise");
     }
     // The picture of a scene's sky is not loaded where no mesh needs it
-    if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, *sky_store(), progress_);
+    if (scene_ && !has_meshes()) rig_ = recorded_lights(*scene_, request_.run, target_, progress_);
     unlit_path_ = temporary_container_path(roomiest_temp_dir(request_.run, target_));
     unlit_ = std::make_unique<TemporaryName>(unlit_path_);
     if (scene_) {

@@ -250,14 +250,14 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
 
 /// Reads the picture of the sky that an input recorded, from where it was or next to that input.
 void load_recorded_sky(const BuildRequest& request, BuildInputs& inputs, const MeshLimits& limits) {
-  const auto store = TextureStore::make(limits.textures, limits.temp_directory);
   const auto name = inputs.clouds.named_by.find(kLightsKey);
   if (name == inputs.clouds.named_by.end()) return;
   const auto of = std::ranges::find_if(request.inputs, [&](const std::filesystem::path& input) {
     return input.filename().string() == name->second;
   });
-  if (of != request.inputs.end())
-    static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(*of), *store));
+  if (of == request.inputs.end()) return;
+  const auto store = TextureStore::make(limits.textures, limits.temp_directory);
+  static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(*of), *store));
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,

@@ -214,9 +214,8 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   // Open the scene, and choose the lights
   LightReport report;
   const ContainerReader scene(with_directory_under(request.scene, request.run));
-  const auto store = texture_store(request.run, target);
-  const LightRig rig =
-      normalised(request.lights ? *request.lights : recorded_lights(scene, *store, progress));
+  const LightRig rig = normalised(
+      request.lights ? *request.lights : recorded_lights(scene, request.run, target, progress));
   const Meta planned = lit_meta(scene, rig, true);
   check_scene(scene, planned);
   if (planned.channels.size() < scene.meta().channels.size())

@@ -96,7 +96,7 @@ MeshLimits mesh_limits(const RenderRequest& request, const Sky& sky,
   return {.reading = left,
           .kept = kLeast,
           .traced = std::max(left > kOthers ? left - kOthers : 0, kLeast),
-          .textures = request.run.memory_bytes / 4,
+          .textures = texture_cap(request.run),
           .temp_directory = roomiest_temp_dir(request.run, target)};
 }
 
@@ -353,10 +353,9 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   LightingReport report;
   Subject subject{.side = side_of(request.samples)};
   Lighting lighting(request, report, progress);
-  const LightRig lights =
-      request.lights ? *request.lights
-                     : recorded_lights(lighting.scene(),
-                                       *texture_store(request.run, targets.front().path), progress);
+  const LightRig lights = request.lights ? *request.lights
+                                         : recorded_lights(lighting.scene(), request.run,
+                                                           targets.front().path, progress);
   check_names(request, targets, lights.sky.map_path);
   load_subject(subject, request, part, lighting.scene(), lights.sky, targets.front().path,
                progress);
@@ -414,10 +413,9 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
 LightingReport render_groups(const RenderRequest& request, std::span<const PictureTarget> targets,
                              Progress& progress) {
   const ContainerReader scene(with_directory_under(request.scene, request.run));
-  const LightRig rig =
-      request.lights
-          ? *request.lights
-          : recorded_lights(scene, *texture_store(request.run, targets.front().path), progress);
+  const LightRig rig = request.lights
+                           ? *request.lights
+                           : recorded_lights(scene, request.run, targets.front().path, progress);
   check_names(request, targets, rig.sky.map_path);
   Progress silent;
   const bool emits =

@@ -320,9 +320,9 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   check_count(receivers, target);
   const ShadedExtras extras = extras_of(request);
   check_shaded_sink(target, receivers.container, extras);
-  const auto store = texture_store(request.run, target);
-  const Sky sky =
-      request.sky ? *request.sky : recorded_lights(lighting.scene(), *store, progress).sky;
+  const Sky sky = request.sky
+                      ? *request.sky
+                      : recorded_lights(lighting.scene(), request.run, target, progress).sky;
   const std::vector<LightRig> rigs =
       rigs_of_groups(recorded_rig(lighting.scene()), request.shadows);
 

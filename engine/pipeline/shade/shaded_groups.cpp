@@ -127,7 +127,7 @@ LightingReport shade_groups(
                   "`light_groups` excludes `sky`: the sky is one of the lights that are in groups");
   const std::filesystem::path directory = roomiest_temp_dir(request.run, target);
   const ContainerReader scene(with_directory_under(request.scene, request.run));
-  const LightRig rig = recorded_lights(scene, *texture_store(request.run, target), progress);
+  const LightRig rig = recorded_lights(scene, request.run, target, progress);
   const bool own = request.receivers.empty();
   LightingReport report;
   Progress silent;

@@ -123,7 +123,7 @@ BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
   room.build_seconds = timed([&] { build_container(request, target, progress); }).wall;
   const ContainerReader container(target);
   room.surfels = container.superblock().points;
-  room.lights = recorded_lights(container, *TextureStore::make(), progress);
+  room.lights = recorded_lights(container, run, target, progress);
   room.camera = from_file || choice.name == "city"
                     ? default_camera(container, cameras, {}, options.size)
                     : lit.camera;

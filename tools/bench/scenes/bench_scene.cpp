@@ -162,7 +162,7 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
   // Build the container, and take light and camera from it
   build_container(request, target, progress);
   const ContainerReader container(target);
-  lit.lights = recorded_lights(container, *TextureStore::make(), progress);
+  lit.lights = recorded_lights(container, run, target, progress);
   if (!procedural) {
     std::optional<Bounds> subject;
     if (choice.backdrop) subject = bounds_before_backdrop(lit.mesh);
