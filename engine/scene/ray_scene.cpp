@@ -288,6 +288,17 @@ double RayScene::epsilon() const noexcept {
 
 std::optional<SurfaceHit> RayScene::closest(const glm::dvec3& origin, const glm::vec3& direction,
                                             double near, double far) const {
+  const auto found = closest_triangle(origin, direction, near, far);
+  if (!found) return {};
+  SurfaceHit hit = surface(found->triangle, found->u, found->v);
+  hit.distance = found->distance;
+  hit.front = found->front;
+  return hit;
+}
+
+std::optional<TriangleHit> RayScene::closest_triangle(const glm::dvec3& origin,
+                                                      const glm::vec3& direction, double near,
+                                                      double far) const {
   const std::optional<LocalRay> local = impl_->localise(origin, direction, near, far);
   if (!local) return {};
   RTCRayHit query{};
@@ -297,10 +308,16 @@ std::optional<SurfaceHit> RayScene::closest(const glm::dvec3& origin, const glm:
   rtcInitIntersectContext(&context);
   rtcIntersect1(impl_->scene, &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  SurfaceHit hit = surface(query.hit.primID, query.hit.u, query.hit.v);
-  hit.distance = local->skipped + static_cast<double>(query.ray.tfar);
-  hit.front = glm::dot(hit.geometric_normal, direction) < 0;
-  return hit;
+  const Mesh& mesh = impl_->mesh;
+  const auto& corners = mesh.triangles[query.hit.primID];
+  const glm::dvec3 a(mesh.positions[corners[0]]);
+  const glm::dvec3 normal = glm::cross(glm::dvec3(mesh.positions[corners[1]]) - a,
+                                       glm::dvec3(mesh.positions[corners[2]]) - a);
+  return TriangleHit{.distance = local->skipped + static_cast<double>(query.ray.tfar),
+                     .triangle = query.hit.primID,
+                     .u = query.hit.u,
+                     .v = query.hit.v,
+                     .front = glm::dot(normal, glm::dvec3(direction)) < 0};
 }
 
 bool RayScene::occluded(const glm::dvec3& origin, const glm::vec3& direction, double near,
@@ -312,6 +329,41 @@ bool RayScene::occluded(const glm::dvec3& origin, const glm::vec3& direction, do
   rtcInitIntersectContext(&context);
   rtcOccluded1(impl_->scene, &context, &ray);
   return ray.tfar < 0;
+}
+
+std::uint32_t RayScene::occluded(const glm::dvec3& origin, std::span<const glm::vec3> directions,
+                                 double near, double far) const {
+  alignas(64) std::array<int, kRaysAtOnce> valid{};
+  RTCRay16 rays{};
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const std::optional<LocalRay> local = impl_->localise(origin, directions[i], near, far);
+    if (!local) continue;
+    valid[i] = -1;
+    rays.org_x[i] = local->origin.x;
+    rays.org_y[i] = local->origin.y;
+    rays.org_z[i] = local->origin.z;
+    rays.dir_x[i] = directions[i].x;
+    rays.dir_y[i] = directions[i].y;
+    rays.dir_z[i] = directions[i].z;
+    rays.tnear[i] = local->near;
+    rays.tfar[i] = local->far;
+    rays.mask[i] = ~0U;
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded16(valid.data(), impl_->scene, &context, &rays);
+  std::uint32_t hidden = 0;
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    if (valid[i] != 0 && rays.tfar[i] < 0) hidden |= 1U << i;
+  }
+  return hidden;
+}
+
+bool RayScene::is_plain(std::uint32_t triangle) const {
+  const Mesh& mesh = impl_->mesh;
+  const Material& material = mesh.materials[mesh.material_of[triangle]];
+  return mesh.normals.empty() && mesh.colours.empty() && !material.texture &&
+         !material.emission_texture;
 }
 
 SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <glm/vec3.hpp>
 
@@ -27,6 +28,14 @@ struct SurfaceHit {
   glm::vec3 albedo{0};    ///< reflectance of the material, times texture and vertex colour there
   glm::vec3 emission{0};  ///< radiance that the front side emits, W/(m^2 sr)
   bool front = true;      ///< whether the ray met the front side
+};
+
+/// Where a ray meets a mesh, without the surface data there.
+struct TriangleHit {
+  double distance = 0;         ///< along the ray from its origin, scene units
+  std::uint32_t triangle = 0;  ///< index in Mesh::triangles
+  float u = 0, v = 0;          ///< barycentric coordinates as RayScene::surface() takes them
+  bool front = true;           ///< whether the ray met the front side
 };
 
 /// Closest-hit and any-hit queries on a mesh.
@@ -56,10 +65,21 @@ class RayScene {
   [[nodiscard]] std::optional<SurfaceHit> closest(const glm::dvec3& origin,
                                                   const glm::vec3& direction, double near,
                                                   double far) const;
+  /// Returns the triangle that closest() finds. Its parameters are those of closest(), and it is
+  /// faster.
+  [[nodiscard]] std::optional<TriangleHit> closest_triangle(const glm::dvec3& origin,
+                                                            const glm::vec3& direction, double near,
+                                                            double far) const;
   /// Reports whether any surface lies on a ray between `near` and `far`. Its parameters are those
   /// of closest(), and it is faster.
   [[nodiscard]] bool occluded(const glm::dvec3& origin, const glm::vec3& direction, double near,
                               double far) const;
+  /// Reports the same of up to kRaysAtOnce rays from one place, which is faster than one at a time.
+  /// @return  bit i says whether any surface lies on the ray along `directions[i]`
+  [[nodiscard]] std::uint32_t occluded(const glm::dvec3& origin,
+                                       std::span<const glm::vec3> directions, double near,
+                                       double far) const;
+  static constexpr std::size_t kRaysAtOnce = 16;
   /// Returns the distance by which a ray's origin steps off a surface so that the ray does not
   /// meet that surface again, scene units: 16 float ulps of half the mesh's largest extent.
   [[nodiscard]] double epsilon() const noexcept;
@@ -73,6 +93,9 @@ class RayScene {
   ///
   /// @throws std::invalid_argument when `triangle` is out of range
   [[nodiscard]] SurfaceHit surface(std::uint32_t triangle, float u, float v) const;
+  /// Says whether a triangle has the same normal, albedo and emission everywhere.
+  /// @param triangle  below the number of triangles
+  [[nodiscard]] bool is_plain(std::uint32_t triangle) const;
 
  private:
   struct Impl;

@@ -101,19 +101,25 @@ std::optional<SurfaceHit> own_surface(const RayScene& scene, const glm::dvec3& p
 std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& position,
                                    const glm::vec3& normal) {
   const double e = scene.epsilon();
-  const std::optional<SurfaceHit> own = own_surface(scene, position, normal);
+  std::optional<SurfaceHit> own = own_surface(scene, position, normal);
   if (!own) return position + kLift * e * glm::dvec3(normal);
+  own->position = position;
+  return step_off(scene, *own, own->front);
+}
+
+std::optional<glm::dvec3> step_off(const RayScene& scene, const SurfaceHit& at, bool front) {
+  const double e = scene.epsilon();
   const Mesh& mesh = scene.mesh();
   std::array<glm::dvec3, 3> corner;
   for (std::size_t i = 0; i < 3; ++i) {
-    corner[i] = glm::dvec3(mesh.positions[mesh.triangles[own->triangle][i]]);
+    corner[i] = glm::dvec3(mesh.positions[mesh.triangles[at.triangle][i]]);
   }
   // Rise along the geometric normal, because an interpolated one may lie nearly in the surface.
-  const glm::vec3 up = own->front ? own->geometric_normal : -own->geometric_normal;
-  const glm::dvec3 inside = mesh.origin + inset(corner, position - mesh.origin, kInset * e);
+  const glm::vec3 up = front ? at.geometric_normal : -at.geometric_normal;
+  const glm::dvec3 inside = mesh.origin + inset(corner, at.position - mesh.origin, kInset * e);
   const glm::dvec3 origin = inside + kLift * e * glm::dvec3(up);
   // Look for a lid between the origin and the own triangle.
-  const auto lid = scene.closest(origin, -up, 0, kLidBelow * e);
+  const auto lid = scene.closest_triangle(origin, -up, 0, kLidBelow * e);
   if (lid && !lid->front) return {};
   return origin;
 }

@@ -21,4 +21,10 @@ namespace ptc {
 [[nodiscard]] std::optional<glm::dvec3> step_off(const RayScene& scene, const glm::dvec3& position,
                                                  const glm::vec3& normal);
 
+/// Moves a point of a known triangle off its surface in the same way.
+/// @param at     what RayScene::surface() returns
+/// @param front  whether light is wanted on the triangle's front
+[[nodiscard]] std::optional<glm::dvec3> step_off(const RayScene& scene, const SurfaceHit& at,
+                                                 bool front);
+
 }  // namespace ptc

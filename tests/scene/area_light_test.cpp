@@ -118,6 +118,16 @@ TEST_CASE("area light: a lamp shines on its front side only", "[scene][lights]")
   CHECK(light.irradiance({0.3, 1, 0.2}, -kUp, {}, 1).local == glm::vec3(0));  // on itself
 }
 
+TEST_CASE("area light: a rig is black without lights, sky and emitters", "[scene][lights]") {
+  const Mesh dark = ground(1), bright = lamp(1, 1, 1, glm::vec3(1));
+  const RayScene dark_scene(dark), bright_scene(bright);
+  CHECK(DirectLight(dark_scene, {}).is_black());
+  CHECK(!DirectLight(bright_scene, {}).is_black());
+  LightRig rig;
+  rig.sky.radiance = glm::vec3(0.1F);
+  CHECK(!DirectLight(dark_scene, rig).is_black());
+}
+
 TEST_CASE("area light: an object in between hides the lamp", "[scene][lights]") {
   Mesh mesh = lamp(1, 2, 1, glm::vec3(1));
   add_quad(mesh, {-5, 1, -5}, {5, 0, 0}, {0, 0, 10});  // the half x < 0

@@ -1,6 +1,7 @@
 // Grouping surface points into clusters.
 #include "engine/scene/sampling/clusters.h"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -34,6 +35,16 @@ std::vector<SurfacePoint> square(int n, const glm::vec3& normal, float height,
     points.back().area = 1.0 / (n * n);
   }
   return points;
+}
+
+// Returns the clusters of a mesh, all of one patch.
+std::vector<Cluster> clusters_of(const Mesh& mesh, double spacing) {
+  SamplingOptions options;
+  options.spacing = spacing;
+  const SpacingField field(options);
+  const SurfacePatch patch = SurfacePatches(mesh, field, 1e9).spread(0, 16);
+  std::vector<std::uint32_t> owners;
+  return cluster_points(patch.points, patch.surfels, 6, owners);
 }
 
 // Returns the sum of squared distances from points to their clusters.
@@ -126,6 +137,43 @@ TEST_CASE("clusters: points of different kinds stay in different clusters", "[sc
   std::vector<std::uint32_t> owners;
   const auto clusters = cluster_points(points, 64, 6, owners);
   for (std::size_t i = 0; i < points.size(); ++i) CHECK(clusters[owners[i]].kind == points[i].kind);
+}
+
+TEST_CASE("clusters: those inside a surface are enclosed, those at its edges and creases are not",
+          "[scene][clusters]") {
+  // Fold a sheet of 2 x 1 by a right angle in its middle.
+  Mesh mesh = empty_mesh();
+  add_quad(mesh, {0, 0, 0}, {0, 0, 1}, {1, 0, 0});
+  add_quad(mesh, {1, 0, 0}, {0, 0, 1}, {0, -1, 0});
+  const double width = 1.0 / 24;
+  int inside = 0, enclosed = 0;
+  for (const Cluster& c : clusters_of(mesh, width)) {
+    const float along = c.position.x < 0.999F ? c.position.x : 1 - c.position.y;  // 0 to 2
+    const auto edge = static_cast<double>(
+        std::min({along, std::abs(1 - along), 2 - along, c.position.z, 1 - c.position.z}));
+    if (edge < 0.7 * width) CHECK(!c.is_enclosed);
+    if (edge < 1.5 * width) continue;
+    inside += 1;
+    enclosed += c.is_enclosed ? 1 : 0;
+  }
+  CHECK(inside > 800);
+  CHECK(enclosed > 0.95 * inside);
+}
+
+TEST_CASE("clusters: a slit of more than half a cluster leaves those next to it open",
+          "[scene][clusters]") {
+  const double width = 1.0 / 24;
+  const auto slit = static_cast<float>(0.6 * width);
+  Mesh mesh = empty_mesh();
+  add_quad(mesh, {0, 0, 0}, {0, 0, 1}, {1, 0, 0});
+  add_quad(mesh, {1 + slit, 0, 0}, {0, 0, 1}, {1, 0, 0});
+  int next = 0;
+  for (const Cluster& c : clusters_of(mesh, width)) {
+    if (static_cast<double>(std::abs(c.position.x - 1 - 0.5F * slit)) > 0.9 * width) continue;
+    next += 1;
+    CHECK(!c.is_enclosed);
+  }
+  CHECK(next > 30);
 }
 
 TEST_CASE("clusters: coincident points, few points and no points are handled",

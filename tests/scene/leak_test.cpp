@@ -86,6 +86,26 @@ TEST_CASE("leak: a closed box is dark to the last bit, even in its corners and e
   check_dark(walled, glm::dmat3(1), 3, 3000);
 }
 
+TEST_CASE("leak: a place whose triangle is known is stepped off as one that is looked for",
+          "[scene][leak]") {
+  Random random(6);
+  Mesh mesh = empty_mesh();
+  add_box(mesh, glm::vec3(-1), glm::vec3(1), true);
+  add_box(mesh, glm::vec3(-0.3F), glm::vec3(0.4F), false);
+  const RayScene scene(mesh);
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (int k = 0; k < 20; ++k) {
+      const auto u = static_cast<float>(random.unit());
+      const auto v = (1 - u) * static_cast<float>(random.unit());
+      const SurfaceHit at = scene.surface(i, u, v);
+      const auto known = step_off(scene, at, true);
+      const auto found = step_off(scene, at.position, at.geometric_normal);
+      REQUIRE(known.has_value() == found.has_value());
+      if (known) CHECK(glm::distance(*known, *found) < 4 * scene.epsilon());
+    }
+  }
+}
+
 TEST_CASE("leak: a closed box is dark, however it is turned and wherever it lies",
           "[scene][leak]") {
   Random random(4);

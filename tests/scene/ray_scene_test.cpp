@@ -1,6 +1,7 @@
 // Rays at a mesh, with a loop over all triangles in double as the oracle.
 #include "engine/scene/ray_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -80,6 +81,43 @@ TEST_CASE("ray scene: the closest hit is that of a loop over all triangles", "[s
     CHECK(hit->front == (glm::dot(hit->geometric_normal, direction) < 0));
   }
   CHECK(hits > 1000);
+}
+
+TEST_CASE("ray scene: rays that are traced together meet what each meets alone", "[scene][rays]") {
+  Random random(2);
+  const Mesh mesh = soup(random, 100);
+  const RayScene scene(mesh);
+  int hidden = 0, seen = 0;
+  for (std::size_t count = 0; count <= RayScene::kRaysAtOnce; ++count) {
+    for (int i = 0; i < 50; ++i) {
+      const glm::dvec3 origin = random.in_box(-1.5, 1.5);
+      std::vector<glm::vec3> directions(count);
+      for (glm::vec3& direction : directions) direction = random.direction();
+      const std::uint32_t bits = scene.occluded(origin, directions, 0.1, 2);
+      CHECK(bits >> count == 0);
+      for (std::size_t k = 0; k < count; ++k) {
+        const bool alone = scene.occluded(origin, directions[k], 0.1, 2);
+        CHECK((bits >> k & 1U) == (alone ? 1U : 0U));
+        (alone ? hidden : seen) += 1;
+        const auto hit = scene.closest(origin, directions[k], 0.1, 2);
+        const auto triangle = scene.closest_triangle(origin, directions[k], 0.1, 2);
+        REQUIRE(triangle.has_value() == hit.has_value());
+        if (hit) CHECK((triangle->triangle == hit->triangle && triangle->front == hit->front));
+      }
+    }
+  }
+  CHECK(std::min(hidden, seen) > 500);
+}
+
+TEST_CASE("ray scene: a triangle is plain without textures, colours and normals of vertices",
+          "[scene][rays]") {
+  Mesh mesh = ground(1);
+  CHECK(RayScene(mesh).is_plain(0));
+  Mesh coloured = mesh;
+  coloured.colours.assign(mesh.positions.size(), glm::vec3(0.5F));
+  CHECK(!RayScene(coloured).is_plain(0));
+  mesh.normals.assign(mesh.positions.size(), glm::vec3(0, 1, 0));
+  CHECK(!RayScene(mesh).is_plain(0));
 }
 
 TEST_CASE("ray scene: hits outside the range from near to far do not count", "[scene][rays]") {

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 
+#include "engine/scene/step_off.h"
 #include "tests/scene/meshes.h"
 
 using namespace ptc;
@@ -14,6 +15,13 @@ namespace {
 
 constexpr float kRadius = 0.1F;
 const glm::vec3 kUp(0, 1, 0);
+
+// Says whether a place that is stepped off its surface is buried, or no place for rays at all.
+bool is_hidden(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+               std::uint64_t seed) {
+  const auto origin = step_off(scene, position, normal);
+  return !origin || is_buried(scene, *origin, normal, seed);
+}
 
 }  // namespace
 
@@ -79,12 +87,12 @@ TEST_CASE("surroundings: a place is buried inside a solid and where solids touch
   add_box(mesh, {0.4F, 0.25F, 0.4F}, {1, 0.5F, 1}, false);   // sunk into the second
   const RayScene scene(mesh);
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    CHECK(is_buried(scene, {-0.3, 0, -0.3}, kUp, seed));
-    CHECK(is_buried(scene, {-0.3, 0, -0.3}, -kUp, seed));
-    CHECK(is_buried(scene, {0.45, 0.5, 0.45}, kUp, seed));
-    CHECK(!is_buried(scene, {0.7, 0.5, 0.7}, kUp, seed));
-    CHECK(!is_buried(scene, {0.7, 0, 0.7}, kUp, seed));  // under the third
-    CHECK(!is_buried(scene, {0, 1, 0}, kUp, seed));
+    CHECK(is_hidden(scene, {-0.3, 0, -0.3}, kUp, seed));
+    CHECK(is_hidden(scene, {-0.3, 0, -0.3}, -kUp, seed));
+    CHECK(is_hidden(scene, {0.45, 0.5, 0.45}, kUp, seed));
+    CHECK(!is_hidden(scene, {0.7, 0.5, 0.7}, kUp, seed));
+    CHECK(!is_hidden(scene, {0.7, 0, 0.7}, kUp, seed));  // under the third
+    CHECK(!is_hidden(scene, {0, 1, 0}, kUp, seed));
   }
 }
 
@@ -100,10 +108,10 @@ TEST_CASE("surroundings: a surface that shows its front or a reflecting back bur
   mirror.materials[0].double_sided = true;
   const RayScene reflecting(mirror);
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    CHECK(!is_buried(inward, {0, -1, 0}, kUp, seed));
-    CHECK(is_buried(outward, {0, -1, 0}, kUp, seed));
+    CHECK(!is_hidden(inward, {0, -1, 0}, kUp, seed));
+    CHECK(is_hidden(outward, {0, -1, 0}, kUp, seed));
   }
-  CHECK(!is_buried(reflecting, {0, -1, 0}, kUp, 1));
+  CHECK(!is_hidden(reflecting, {0, -1, 0}, kUp, 1));
 }
 
 TEST_CASE("surroundings: the place under a surface that lies on another is buried",
@@ -113,6 +121,6 @@ TEST_CASE("surroundings: the place under a surface that lies on another is burie
   Mesh mesh = plane;
   add_quad(mesh, {-0.5F, up, 0.5F}, {0, 0, -1}, {1, 0, 0});  // faces down
   const RayScene scene(mesh);
-  CHECK(is_buried(scene, {0, 0, 0}, kUp, 1));
-  CHECK(!is_buried(scene, {0.7, 0, 0}, kUp, 1));
+  CHECK(is_hidden(scene, {0, 0, 0}, kUp, 1));
+  CHECK(!is_hidden(scene, {0.7, 0, 0}, kUp, 1));
 }

@@ -11,8 +11,10 @@
 #include "engine/scene/light/direct_light.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -84,16 +86,50 @@ bool DirectLight::is_hidden(const Place& at, const glm::dvec3& end) const {
   return distance > 0 && scene_.occluded(at.origin, glm::vec3(offset / distance), 0, distance);
 }
 
+// Sums up the light of rays from one place, which are traced as many at once as RayScene takes.
+class DirectLight::OpenRays {
+ public:
+  OpenRays(const RayScene& scene, const Place& at) : scene_(scene), at_(at) {}
+
+  // @param light  what the ray brings when nothing is in the way
+  void add(const glm::vec3& direction, const glm::vec3& light) {
+    directions_[size_] = direction;
+    lights_[size_] = light;
+    if (++size_ == directions_.size()) trace();
+  }
+
+  [[nodiscard]] glm::vec3 sum() {
+    if (size_ > 0) trace();
+    return sum_;
+  }
+
+ private:
+  void trace() {
+    const std::uint32_t hidden =
+        scene_.occluded(at_.origin, std::span(directions_).first(size_), 0, kFar);
+    for (std::size_t i = 0; i < size_; ++i) {
+      if ((hidden >> i & 1U) == 0) sum_ += lights_[i];
+    }
+    size_ = 0;
+  }
+
+  const RayScene& scene_;
+  const Place& at_;
+  std::array<glm::vec3, RayScene::kRaysAtOnce> directions_{}, lights_{};
+  std::size_t size_ = 0;
+  glm::vec3 sum_{0};
+};
+
 // Weighs a ray by the balance heuristic: L cos over the sum of all densities that could have
 // brought its direction, each times its number of rays (Veach and Guibas 1995). So a direction that
 // both samplings may bring does not count twice.
-glm::vec3 DirectLight::along_sky_ray(const Place& at, const glm::vec3& direction, float cosine_rays,
-                                     float map_rays, float map_density) const {
+void DirectLight::add_sky_ray(const Place& at, const glm::vec3& direction, float cosine_rays,
+                              float map_rays, float map_density, OpenRays& rays) const {
   const float cosine = glm::dot(at.normal, direction);
-  if (cosine <= 0) return glm::vec3(0);
+  if (cosine <= 0) return;
   const glm::vec3 light = rays_.rig().sky.at(direction);
-  if (!is_lit(light) || scene_.occluded(at.origin, direction, 0, kFar)) return glm::vec3(0);
-  return light * (cosine / (cosine_rays * cosine / kPi + map_rays * map_density));
+  if (!is_lit(light)) return;
+  rays.add(direction, light * (cosine / (cosine_rays * cosine / kPi + map_rays * map_density)));
 }
 
 glm::vec3 DirectLight::from_sky(const Place& at, unsigned rays) const {
@@ -104,32 +140,41 @@ glm::vec3 DirectLight::from_sky(const Place& at, unsigned rays) const {
   const auto by_cosine = static_cast<float>(cosine_rays);
   const auto by_map = static_cast<float>(map_rays);
   const Basis frame(at.normal);
-  glm::vec3 sum(0);
-  // Trace rays by the cosine.
+  OpenRays open(scene_, at);
+  // Add rays by the cosine.
   const SquarePoints hemisphere = light_points(at.seed, LightKind::sky);
   for (std::uint32_t i = 0; i < cosine_rays; ++i) {
     const glm::vec3 direction = frame.to_world(cosine_direction(hemisphere.square(i)));
     const float density = map_rays > 0 ? sky_density_->density(direction) : 0;
-    sum += along_sky_ray(at, direction, by_cosine, by_map, density);
+    add_sky_ray(at, direction, by_cosine, by_map, density, open);
   }
-  // Trace rays by the brightness of the map.
+  // Add rays by the brightness of the map.
   const SquarePoints map = light_points(at.seed, LightKind::sky_map);
   for (std::uint32_t i = 0; i < map_rays; ++i) {
     const SkyDensity::Sample sample = sky_density_->sample(map.square(i));
-    sum += along_sky_ray(at, sample.direction, by_cosine, by_map, sample.density);
+    add_sky_ray(at, sample.direction, by_cosine, by_map, sample.density, open);
   }
-  return sum;
+  return open.sum();
 }
 
 DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const glm::vec3& normal,
                                             const LightSampling& sampling,
                                             std::uint64_t seed) const {
   const std::optional<Place> at = place_at(scene_, position, normal, seed);
-  if (!at) return {};
+  return at ? irradiance(*at, sampling) : Result{};
+}
+
+DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const glm::dvec3& origin,
+                                            const glm::vec3& normal, const LightSampling& sampling,
+                                            std::uint64_t seed) const {
+  return irradiance({position, origin, glm::normalize(normal), seed}, sampling);
+}
+
+DirectLight::Result DirectLight::irradiance(const Place& at, const LightSampling& sampling) const {
   // Add up the lights. A result that overflows counts as black.
   Result result;
-  result.local = from_lights(*at, sampling).arrives;
-  result.sky = from_sky(*at, sampling.sky_rays);
+  result.local = from_lights(at, sampling).arrives;
+  result.sky = from_sky(at, sampling.sky_rays);
   if (!is_finite(result.local)) result.local = glm::vec3(0);
   if (!is_finite(result.sky)) result.sky = glm::vec3(0);
   return result;

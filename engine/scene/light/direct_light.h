@@ -36,6 +36,13 @@ class DirectLight {
   /// @param normal    of any length; a vector without a direction receives no light
   [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::vec3& normal,
                                   const LightSampling& sampling, std::uint64_t seed) const;
+  /// Estimates the irradiance at a point whose rays begin where the caller says.
+  /// @param origin  scene units, as step_off() returns it
+  [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::dvec3& origin,
+                                  const glm::vec3& normal, const LightSampling& sampling,
+                                  std::uint64_t seed) const;
+  /// Says whether no light and no emitter shines.
+  [[nodiscard]] bool is_black() const noexcept { return sky_is_black_ && rays_.empty(); }
   /// Estimates the share of the light of suns, point and spot lights that the mesh hides, as
   /// hidden_share().
   /// @param position, normal, seed  as for irradiance()
@@ -46,6 +53,7 @@ class DirectLight {
 
  private:
   struct Place;
+  [[nodiscard]] Result irradiance(const Place& at, const LightSampling& sampling) const;
   /// Irradiance of lights and emitters, with what is hidden and without.
   struct Sums {
     glm::vec3 arrives{0}, open{0};
@@ -55,8 +63,9 @@ class DirectLight {
                                                      const glm::vec3& normal, std::uint64_t seed);
   [[nodiscard]] Sums from_lights(const Place& at, const LightSampling& sampling) const;
   [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
-  [[nodiscard]] glm::vec3 along_sky_ray(const Place& at, const glm::vec3& direction,
-                                        float cosine_rays, float map_rays, float map_density) const;
+  class OpenRays;
+  void add_sky_ray(const Place& at, const glm::vec3& direction, float cosine_rays, float map_rays,
+                   float map_density, OpenRays& rays) const;
   [[nodiscard]] bool is_hidden(const Place& at, const glm::dvec3& end) const;
 
   const RayScene& scene_;

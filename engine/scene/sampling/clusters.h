@@ -16,6 +16,8 @@ struct Cluster {
   glm::vec3 position{0};   ///< mean position of the members, relative to Mesh::origin
   glm::vec3 normal{0};     ///< mean normal of the members, unit
   std::uint32_t kind = 0;  ///< SurfacePoint::kind, which all members share
+  /// Whether clusters lie next to it all around, so that the surface goes on there.
+  bool is_enclosed = false;
 };
 
 /// Clusters points by Lloyd's method. The middles end up regularly spaced, each near the middle of

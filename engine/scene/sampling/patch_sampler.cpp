@@ -9,6 +9,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/scene/sampling/surroundings.h"
+#include "engine/scene/step_off.h"
 
 namespace ptc {
 namespace {
@@ -86,10 +87,12 @@ std::vector<PatchSampler::Group> PatchSampler::sum_up(const std::vector<SurfaceP
                                                       const std::vector<std::uint32_t>& owners,
                                                       const std::vector<Cluster>& clusters) const {
   std::vector<Group> groups(clusters.size());
+  SurfaceHit surface;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const SurfacePoint& p = points[i];
     Group& group = groups[owners[i]];
-    const SurfaceHit surface = scene_.surface(p.triangle, p.uv.x, p.uv.y);
+    if (i == 0 || p.triangle != surface.triangle || !scene_.is_plain(p.triangle))
+      surface = scene_.surface(p.triangle, p.uv.x, p.uv.y);
     group.area += p.area;
     group.members.push_back(i);
     group.albedo += glm::dvec3(surface.albedo);
@@ -123,8 +126,9 @@ Surfel PatchSampler::place(const Group& group, const SurfacePoint& nearest,
   surfel.normal = length > kMinNormal * count ? glm::vec3(group.normal / length) : at.normal;
   surfel.radius = static_cast<float>(std::sqrt(0.5 * group.area));
   surfel.albedo = finite_or_black(glm::vec3(group.albedo / count));
-  surfel.position =
-      at.position + glm::dvec3(move_inwards(scene_, at.position, surfel.normal, surfel.radius));
+  surfel.position = at.position;
+  if (!cluster.is_enclosed)
+    surfel.position += move_inwards(scene_, at.position, surfel.normal, surfel.radius);
   return surfel;
 }
 
@@ -142,10 +146,19 @@ std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
     const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
     const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
     const std::uint64_t own_seed = kLitPoints * seed + i;
-    if (is_buried(scene_, at.position, side * at.geometric_normal, own_seed)) continue;
-    const DirectLight::Result direct =
-        light_->irradiance(at.position, side * at.normal, lit_point_, own_seed);
-    sum += finite_or_black(at.albedo / kPi * (direct.local + direct.sky));
+    const auto origin = step_off(scene_, at, side > 0);
+    if (!origin) continue;
+    // What light reaches is not buried; look around where there is none.
+    glm::vec3 arrives(0);
+    if (!light_->is_black()) {
+      const DirectLight::Result direct =
+          light_->irradiance(at.position, *origin, side * at.normal, lit_point_, own_seed);
+      arrives = direct.local + direct.sky;
+    }
+    if (arrives == glm::vec3(0) && is_buried(scene_, *origin, side * at.geometric_normal, own_seed))
+      continue;
+    if (light_->is_black()) return glm::vec3(0);
+    sum += finite_or_black(at.albedo / kPi * arrives);
     lit += 1;
   }
   if (lit == 0) return {};

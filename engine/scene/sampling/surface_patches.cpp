@@ -7,14 +7,15 @@
 //     patch   ->  parts, up to 1 spacing wide     ->  sorted within the patch   ->  points
 //
 // The points of a patch lie at equal steps of that line. Point k owns the weight from k to k + 1
-// steps, and lies in the part, or the half of it and so on, where the middle of its step falls:
+// steps, and lies in the part where the middle of its step falls:
 //
 //     parts    |----a----|--b--|-c-|------d------|---e---|     lengths are weights
 //     steps    |-----+-----+-----+-----+-----+-----+-----|
 //     points      0     1     2     3     4     5     6
 //
-// Within that half it is set at random, so that the points are even without being regular. Areas
-// are shared out by the same steps, so they add up exactly, even where a step spans many parts.
+// The points of a part follow a sequence that fills a square evenly however many are taken, moved
+// at random and folded onto the triangle (Roberts 2018, R2). Areas are shared out by the steps, so
+// they add up exactly, even where a step spans many parts.
 #include "engine/scene/sampling/surface_patches.h"
 
 #include <algorithm>
@@ -63,8 +64,11 @@ std::uint64_t place_on_curve(const glm::dvec3& offset, double widest, int bits) 
 struct Part {
   std::array<glm::vec2, 3> uv;  // barycentric coordinates of its corners
   std::uint32_t triangle;
-  double spacing;  // wanted there
-  double weight;   // area over spacing squared
+  std::uint32_t kind;  // SurfacePoint::kind of its points
+  double spacing;      // wanted there
+  double weight;       // area over spacing squared
+  glm::vec3 centre;    // relative to Mesh::origin
+  glm::vec3 normal;    // unit
 };
 
 // All parts of a patch, which sort() puts in an order that keeps neighbours together.
@@ -74,33 +78,25 @@ class Parts {
 
   // Cuts a piece of surface into parts and adds them.
   void add(std::uint32_t triangle, const SubTriangle& shape, double spacing) {
-    const double weight = shape.area() / (spacing * spacing);
-    if (!(weight > 0)) return;
-    if (weight > kPartWeight && shape.longest_edge() > kPartSpacings * spacing) {
-      add(triangle, shape.half(false), spacing);
-      add(triangle, shape.half(true), spacing);
-      return;
-    }
-    parts_.push_back({{glm::vec2(shape.uv[0]), glm::vec2(shape.uv[1]), glm::vec2(shape.uv[2])},
-                      triangle,
-                      spacing,
-                      weight});
-    total_ += weight;
-    area_ += shape.area() * ((kind_of(parts_.back()) & 2u) != 0 ? 2 : 1);
-    bounds_.add(shape.centre());
-    keys_.emplace_back(0, static_cast<std::uint32_t>(keys_.size()));
+    const glm::dvec3 normal = shape.normal();
+    const double area = 0.5 * glm::length(normal);
+    if (!(area / (spacing * spacing) > 0)) return;
+    const Material& material = mesh_.materials[mesh_.material_of[triangle]];
+    const bool emits = material.emission != glm::vec3(0);
+    add_halves({.uv = {},
+                .triangle = triangle,
+                .kind = (material.double_sided ? 2U : 0U) | (emits ? 1U : 0U),
+                .spacing = spacing,
+                .weight = area / (spacing * spacing),
+                .centre = {},
+                .normal = glm::vec3(normal / (2 * area))},
+               shape);
   }
 
   // Returns the weight of all parts.
   [[nodiscard]] double weight() const { return total_; }
   // Returns the area of all parts; both sides of double-sided materials count.
   [[nodiscard]] double area() const { return area_; }
-  // Returns SurfacePoint::kind of the points on a part.
-  [[nodiscard]] std::uint32_t kind_of(const Part& part) const {
-    const Material& material = mesh_.materials[mesh_.material_of[part.triangle]];
-    const bool emits = material.emission != glm::vec3(0);
-    return (material.double_sided ? 2u : 0u) | (emits ? 1u : 0u);
-  }
 
   [[nodiscard]] SubTriangle shape_of(const Part& part) const {
     const auto& c = mesh_.triangles[part.triangle];
@@ -124,9 +120,8 @@ class Parts {
     const double widest = widest_side(bounds_);
     for (auto& [key, index] : keys_) {
       const Part& part = parts_[index];
-      const SubTriangle shape = shape_of(part);
-      const std::uint64_t group = kind_of(part) << 3 | side_of(shape.normal());
-      key = group << 54 | place_on_curve(shape.centre() - bounds_.low, widest, 18);
+      const std::uint64_t group = part.kind << 3 | side_of(part.normal);
+      key = group << 54 | place_on_curve(glm::dvec3(part.centre) - bounds_.low, widest, 18);
     }
     std::sort(keys_.begin(), keys_.end());
   }
@@ -137,9 +132,27 @@ class Parts {
   }
 
  private:
+  // Cuts a part until it is narrow or wants few surfels. The halves have half its weight each.
+  void add_halves(Part part, const SubTriangle& shape) {
+    if (part.weight > kPartWeight && shape.longest_edge() > kPartSpacings * part.spacing) {
+      part.weight *= 0.5;
+      add_halves(part, shape.half(false));
+      add_halves(part, shape.half(true));
+      return;
+    }
+    for (std::size_t i = 0; i < 3; ++i) part.uv[i] = glm::vec2(shape.uv[i]);
+    const glm::dvec3 centre = shape.centre();
+    part.centre = glm::vec3(centre);
+    total_ += part.weight;
+    area_ += part.weight * part.spacing * part.spacing * ((part.kind & 2U) != 0 ? 2 : 1);
+    bounds_.add(centre);
+    keys_.emplace_back(0, static_cast<std::uint32_t>(keys_.size()));
+    parts_.push_back(part);
+  }
+
   // Returns the axis that a normal follows most: twice its number, and 1 more where it is negative.
-  static std::uint32_t side_of(const glm::dvec3& normal) {
-    const glm::dvec3 size = glm::abs(normal);
+  static std::uint32_t side_of(const glm::vec3& normal) {
+    const glm::vec3 size = glm::abs(normal);
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     return static_cast<std::uint32_t>(2 * axis + (normal[axis] < 0 ? 1 : 0));
   }
@@ -167,16 +180,13 @@ class Spread {
     walked_ += part.weight;
     share_area(begin, walked_, part.spacing * part.spacing);
     part_ = &part;
-    const std::size_t first = from(begin);
-    const std::size_t last = from(walked_);
-    if (first < last) place(parts_.shape_of(part), begin, walked_, first, last);
+    place(part, from(begin), from(walked_));
   }
 
   // Sets the last point where rounding has left its middle just beyond the end.
   void finish() {
-    if (part_ != nullptr && from(walked_) < out_.size()) {
-      put(parts_.shape_of(*part_), out_.size() - 1);
-    }
+    if (part_ != nullptr && from(walked_) < out_.size())
+      place(*part_, out_.size() - 1, out_.size());
   }
 
  private:
@@ -199,36 +209,32 @@ class Spread {
     }
   }
 
-  // Sets the points from k up to k_end on a shape that covers the weight from `begin` to `end`:
-  // halves the shape until each half has one point.
-  void place(const SubTriangle& shape, double begin, double end, std::size_t k, std::size_t k_end) {
+  // Sets the points from k up to k_end on a part.
+  void place(const Part& part, std::size_t k, std::size_t k_end) {
     if (k == k_end) return;
-    if (k_end - k == 1) return put(shape, k);
-    const double middle = 0.5 * (begin + end);
-    const std::size_t k_middle = std::clamp(from(middle), k, k_end);
-    place(shape.half(false), begin, middle, k, k_middle);
-    place(shape.half(true), middle, end, k_middle, k_end);
-  }
-
-  // Sets point k at random on a shape.
-  void put(const SubTriangle& shape, std::size_t k) {
-    // Choose barycentric coordinates, uniform in the area.
+    // Move the sequence at random.
     const std::uint64_t hash = splitmix64(seed_ + k);
     double a = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash)));
     double b = static_cast<double>(to_unit(static_cast<std::uint32_t>(hash >> 32)));
-    if (a + b > 1) {
-      a = 1 - a;
-      b = 1 - b;
+    const SubTriangle shape = parts_.shape_of(part);
+    for (; k < k_end; ++k) {
+      // Fold the square onto the triangle.
+      const bool beyond = a + b > 1;
+      const double u = beyond ? 1 - a : a, v = beyond ? 1 - b : b;
+      const auto blend = [&](const auto& x) { return (1 - u - v) * x[0] + u * x[1] + v * x[2]; };
+      SurfacePoint& point = out_[k];
+      point.triangle = part.triangle;
+      point.uv = glm::vec2(blend(shape.uv));
+      point.position = glm::vec3(blend(shape.corner));
+      point.normal = part.normal;
+      point.kind = part.kind;
+      a = next(a, 0.7548776662466927);
+      b = next(b, 0.5698402909980532);
     }
-    // Fill in the point there.
-    const auto blend = [&](const auto& v) { return (1 - a - b) * v[0] + a * v[1] + b * v[2]; };
-    SurfacePoint& point = out_[k];
-    point.triangle = part_->triangle;
-    point.uv = glm::vec2(blend(shape.uv));
-    point.position = glm::vec3(blend(shape.corner));
-    point.normal = glm::vec3(glm::normalize(shape.normal()));
-    point.kind = parts_.kind_of(*part_);
   }
+
+  // Goes on by one step of a sequence in [0, 1).
+  static double next(double x, double step) { return x + step < 1 ? x + step : x + step - 1; }
 
   const Parts& parts_;
   double step_;  // weight of each point

@@ -24,7 +24,6 @@
 
 #include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
-#include "engine/scene/step_off.h"
 
 namespace ptc {
 namespace {
@@ -86,17 +85,16 @@ glm::vec3 move_inwards(const RayScene& scene, const glm::dvec3& position, const 
   return moment * (-kMovePerMoment * kPi / kDirections);
 }
 
-bool is_buried(const RayScene& scene, const glm::dvec3& position, const glm::vec3& normal,
+bool is_buried(const RayScene& scene, const glm::dvec3& origin, const glm::vec3& normal,
                std::uint64_t seed) {
   const Mesh& mesh = scene.mesh();
-  const auto origin = step_off(scene, position, normal);
-  if (!origin) return true;
   const Basis frame(normal);
   const SquarePoints points(seed);
   bool front = false;
   for (std::uint32_t i = 0; i < kBuriedRays; ++i) {
-    const auto hit = scene.closest(*origin, frame.to_world(cosine_direction(points.square(i))), 0,
-                                   std::numeric_limits<double>::infinity());
+    const auto hit =
+        scene.closest_triangle(origin, frame.to_world(cosine_direction(points.square(i))), 0,
+                               std::numeric_limits<double>::infinity());
     if (!hit) return false;
     if (!hit->front && !mesh.materials[mesh.material_of[hit->triangle]].double_sided) continue;
     if (front) return false;

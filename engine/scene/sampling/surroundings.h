@@ -33,9 +33,9 @@ namespace ptc {
 ///
 /// The test sends 8 cosine rays: none may escape, and at most one may meet a front, which belongs
 /// to a second solid that is sunk into the same one. The result is deterministic in `seed`.
-/// @param position  scene units
+/// @param origin  of the rays, scene units, as step_off() returns it
 /// @param normal  unit, on the side that is asked about
-[[nodiscard]] bool is_buried(const RayScene& scene, const glm::dvec3& position,
+[[nodiscard]] bool is_buried(const RayScene& scene, const glm::dvec3& origin,
                              const glm::vec3& normal, std::uint64_t seed);
 
 }  // namespace ptc
