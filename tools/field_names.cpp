@@ -57,6 +57,7 @@ constexpr std::array kFields{
     FieldName{"sampling.finest", "--finest"},
     FieldName{"sampling.lights.area_rays", "--area-rays"},
     FieldName{"sampling.pixels_per_surfel", "--pixels-per-surfel"},
+    FieldName{"texture.margin", "--margin"},
     FieldName{"sampling.spacing", "--spacing"},
     FieldName{"selection.every", "--every"},
     FieldName{"shadows", "--shadow"},

@@ -1,8 +1,8 @@
 // ptcrender: renders a picture of a scene, lit directly by rays and indirectly by its surfels.
 #include <algorithm>
+#include <array>
 #include <cstddef>
-#include <set>
-#include <span>
+#include <string_view>
 
 #include "engine/base/error.h"
 #include "engine/pipeline/budgets.h"
@@ -52,34 +52,9 @@ struct Arguments {
   ptc::CameraArguments camera;
 };
 
-/// Declares --layer and checks its values: a known layer and the name of a PNG.
-void add_layers(ptc::Command& command, Arguments& arguments) {
-  const auto check = [](const std::string& text) {
-    const auto layers = std::span(ptc::kPictureLayers).subspan(1);  // the first is the output's own
-    const std::size_t equals = text.find('=');
-    const bool known = std::ranges::find(layers, text.substr(0, equals)) != layers.end() &&
-                       ptc::has_ending(text, ".png");
-    return known && equals != std::string::npos ? std::string()
-                                                : "expects direct=, indirect=, occlusion=, albedo= "
-                                                  "or reflection= and the name of a .png, not '" +
-                                                      text + "'";
-  };
-  const auto set = [&](const std::vector<std::string>& values) {
-    for (const std::string& text : values) {
-      const std::size_t equals = text.find('=');
-      arguments.layers.push_back({text.substr(equals + 1), text.substr(0, equals)});
-    }
-  };
-  CLI::Option* layers = command.app().add_option_function<std::vector<std::string>>(
-      "--layer", set,
-      "Also write a layer as PNG; repeatable\n"
-      "Layers are direct, indirect, occlusion, albedo and, with --glossy, reflection.");
-  ptc::offer(layers, {"direct=", "indirect=", "occlusion=", "albedo=", "reflection=", ".png"})
-      ->type_name("LAYER=FILE")
-      ->group(ptc::kFilesGroup)
-      ->allow_extra_args(false)
-      ->check(check);
-}
+/// The layers that a .png may show, without the picture itself.
+constexpr std::array<std::string_view, 5> kLayers{"direct", "indirect", "occlusion", "albedo",
+                                                  "reflection"};
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::RenderRequest& request = arguments.request;
@@ -87,7 +62,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
                           "Container, clouds or meshes whose surfels give the indirect light");
   command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png"},
                       "Picture to write (.exr with all layers, or .png); repeatable");
-  add_layers(command, arguments);
+  ptc::add_layers(command.app(), arguments.layers, kLayers);
   command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
                      "Mesh that the camera sees; repeatable\n"
                      "By default the camera sees the surfels, or the meshes of SCENE when that has "
@@ -105,18 +80,7 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
       "Camera position and target [default: from the files]\n"
       "By default the camera is that of the mesh. Without one it is the camera of the build, and "
       "without that, one that sees the whole scene, or all that stands on the backdrop.");
-  ptc::add_integer(app, "--samples", arguments.request.samples, 1, 4096,
-                   "Rays for each pixel, a square number")
-      ->check(CLI::Validator(
-          [](std::string& text) {
-            const std::uint64_t count = std::stoull(text);
-            std::uint64_t side = 1;
-            while (side * side < count) ++side;
-            return side * side == count ? std::string()
-                                        : "expects a square number (1, 4, 9, 16 ...), not " + text;
-          },
-          ""))
-      ->group(kGroup);
+  ptc::add_samples(app, arguments.request.samples)->group(kGroup);
   app.add_option("--exposure", arguments.request.exposure, "Exposure of a .png, without a curve")
       ->type_name("STOPS")
       ->check(ptc::in_range(-64, 64))

@@ -332,6 +332,72 @@ void add_light_sampling(CLI::App& app, LightSampling& sampling) {
       ->group(kExpertGroup);
 }
 
+CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
+                        std::span<const std::string_view> names) {
+  std::vector<std::string> words;
+  for (const std::string_view name : names) words.push_back(std::string(name) + "=");
+  const std::string told = join({words.begin(), words.end() - 1}, ", ") + " or " + words.back();
+  words.emplace_back(".png");
+  const auto check = [names, told](const std::string& text) {
+    const std::size_t equals = text.find('=');
+    const bool known =
+        std::ranges::find(names, text.substr(0, equals)) != names.end() && has_ending(text, ".png");
+    return known && equals != std::string::npos
+               ? std::string()
+               : "expects " + told + " and the name of a .png, not '" + text + "'";
+  };
+  const auto set = [&layers](const std::vector<std::string>& values) {
+    for (const std::string& text : values) {
+      const std::size_t equals = text.find('=');
+      layers.push_back({text.substr(equals + 1), text.substr(0, equals)});
+    }
+  };
+  CLI::Option* option = app.add_option_function<std::vector<std::string>>(
+      "--layer", set,
+      "Also write a layer as PNG; repeatable\nLAYER is " + told +
+          (std::ranges::find(names, "reflection") != names.end() ? " (with --glossy)." : "."));
+  return offer(option, words)
+      ->type_name("LAYER=FILE")
+      ->group(kFilesGroup)
+      ->allow_extra_args(false)
+      ->check(check);
+}
+
+CLI::Option* add_samples(CLI::App& app, unsigned& samples) {
+  return add_integer(app, "--samples", samples, 1, 4096, "Samples of each pixel, a square number")
+      ->check(CLI::Validator(
+          [](std::string& text) {
+            const std::uint64_t count = std::stoull(text);
+            std::uint64_t side = 1;
+            while (side * side < count) ++side;
+            return side * side == count ? std::string()
+                                        : "expects a square number (1, 4, 9, 16 ...), not " + text;
+          },
+          ""));
+}
+
+CLI::Option* add_size(CLI::App& app, std::optional<std::array<unsigned, 2>>& size, bool square,
+                      const std::string& purpose, const std::string& usual) {
+  const auto set = [&size, square](const std::string& text) {
+    constexpr unsigned kMax = 1 << 16;  // of a side of an EXR
+    const char* expected = square ? "WIDTHxHEIGHT or one number for both, 1 to 65536"
+                                  : "WIDTHxHEIGHT, such as 960x540, 1 to 65536 each";
+    const auto side = [&](std::string_view digits) {
+      const auto pixels = parse_number<unsigned>(digits);
+      if (!pixels || *pixels < 1 || *pixels > kMax) refuse("--size", text, expected);
+      return *pixels;
+    };
+    const std::size_t cross = text.find('x');
+    const std::string_view whole = text;
+    if (cross == std::string::npos && !square) refuse("--size", text, expected);
+    const unsigned width = side(whole.substr(0, cross));
+    size = {width, cross == std::string::npos ? width : side(whole.substr(cross + 1))};
+  };
+  return app.add_option_function<std::string>("--size", set, purpose)
+      ->type_name(square ? "N|WxH" : "WxH")
+      ->default_str(usual);
+}
+
 void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
   app.add_option_function<std::string>(
          "--camera", [this](const std::string& text) { set_place(text); }, purpose)
@@ -348,11 +414,8 @@ void CameraArguments::declare(CLI::App& app, const std::string& purpose) {
       ->check(in_range(0.01, 179))
       ->needs("--camera")
       ->group("Camera");
-  app.add_option_function<std::string>(
-         "--size", [this](const std::string& text) { set_size(text); },
-         "Width and height of the picture, in pixels")
-      ->type_name("WxH")
-      ->default_str(std::to_string(camera_.width) + "x" + std::to_string(camera_.height))
+  add_size(app, size_, false, "Width and height of the picture, in pixels",
+           std::to_string(camera_.width) + "x" + std::to_string(camera_.height))
       ->group("Camera");
 }
 
@@ -363,21 +426,6 @@ void CameraArguments::set_place(const std::string& text) {
   camera_.look_at = {n[3], n[4], n[5]};
   if (camera_.position == camera_.look_at) refuse("--camera", text, kExpected);
   given_ = true;
-}
-
-void CameraArguments::set_size(const std::string& text) {
-  constexpr unsigned kMax = 1 << 16;  // of a side of an EXR
-  const std::size_t cross = text.find('x');
-  const auto side = [&](std::string_view digits) {
-    const auto pixels = parse_number<unsigned>(digits);
-    if (!pixels || *pixels < 1 || *pixels > kMax) {
-      refuse("--size", text, "WIDTHxHEIGHT, 1 to 65536 each");
-    }
-    return *pixels;
-  };
-  if (cross == std::string::npos) refuse("--size", text, "WIDTHxHEIGHT, such as 960x540");
-  const std::string_view whole = text;
-  size_ = {side(whole.substr(0, cross)), side(whole.substr(cross + 1))};
 }
 
 std::optional<Camera> CameraArguments::camera() const {

@@ -4,12 +4,15 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "engine/base/progress.h"
+#include "engine/pipeline/render/picture_files.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 
@@ -78,6 +81,18 @@ void add_shadow_rays(CLI::App& app, LightSampling& sampling);
 /// Declares --sun-rays, --area-rays and --sky-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);
 
+/// Declares --layer, which takes the name of a layer and of a PNG.
+/// @param names  of the layers; must outlive the parsing
+CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
+                        std::span<const std::string_view> names);
+/// Declares --samples, of a pixel or texel.
+CLI::Option* add_samples(CLI::App& app, unsigned& samples);
+/// Declares --size. @param size  width and height, pixels; stays empty unless it is given
+/// @param square  a single number is taken for both
+/// @param usual   the default that help shows
+CLI::Option* add_size(CLI::App& app, std::optional<std::array<unsigned, 2>>& size, bool square,
+                      const std::string& purpose, const std::string& usual);
+
 /// The values of --camera, --fov and --size.
 class CameraArguments {
  public:
@@ -93,7 +108,6 @@ class CameraArguments {
 
  private:
   void set_place(const std::string& text);
-  void set_size(const std::string& text);
 
   Camera camera_;
   bool given_ = false;

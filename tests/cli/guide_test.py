@@ -57,7 +57,10 @@ def write_torus(path, around=48, across=24):
 def write_inputs(folder):
     """The files with which every page begins."""
     write_torus(folder / "statue.ply")
-    (folder / "room.obj").write_text(BOX)
+    # Texture coordinates give the floor the left half of a texture, and the wall the right one.
+    (folder / "room.obj").write_text(
+        re.sub(r"^f.*\n", "", BOX, flags=re.M) + "vt 0.02 0.02\nvt 0.48 0.02\nvt 0.48 0.98\nvt 0.02 0.98\n"
+        "vt 0.52 0.02\nvt 0.98 0.02\nvt 0.98 0.98\nvt 0.52 0.98\nf 4/4 3/3 2/2 1/1\nf 1/5 2/6 6/7 5/8\n")
     points = ball(4000)
     names = ["x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"]
     write_ply(folder / "scan.ply", [point[:6] + point[10:] for point in points], names)

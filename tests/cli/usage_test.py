@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import time
 import unittest
@@ -28,7 +29,7 @@ class Usage(ProgramTest):
                 long = any(word in line for word in ("--city", "--quick", " build ", " growth ", " scale ", " sort "))
                 if not line.startswith("  " + program) or long:
                     continue
-                words = line.split("|")[0].replace("/scratch", str(self.here)).split()
+                words = shlex.split(line.split("|")[0].replace("/scratch", str(self.here)))
                 message = self.fail_with(1, program, *words[1:], cwd=self.here)
                 self.assertRegex(message, "No such file or directory|no file matches", line)
 
@@ -71,6 +72,7 @@ class Usage(ProgramTest):
         for program in PROGRAMS:
             operands = {"ptcinfo": [self.scene], "ptcverify": [self.scene],
                         "ptcconvert": [self.scene, self.here / "o.ply"],
+                        "ptcbake": [self.scene, "-o", self.here / "o.png"],
                         "ptcrender": [self.scene, "-o", self.here / "o.png"],
                         "ptcshade": [self.scene, "-o", self.here / "o.ply"],
                         "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
@@ -105,6 +107,8 @@ class Usage(ProgramTest):
                          "--lift=-1", "--bounces=-1", "--bounces=1.5", "--bounces=1001", "--io=mail", "--check=-1", "--check-rays=0",
                          "--error=0", "--error=0%", "--error=-2%", "--error=2", "--error=101%", "--error=nan",
                          "--error=%", "--error=", "--error=2 %", "--error=two"],
+            "ptcbake": ["--margin=-1", "--margin=65", "--size=0", "--size=10x", "--size=x5", "--size=65537", "--samples=2",
+                        "--layer=reflection=o.png", "--layer=irradiance=o.exr"],
             "ptcrender": ["--bounces=-1", "--size=10", "--size=0x10", "--size=10x", "--size=-1x5", "--size=10x70000",
                           "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
@@ -113,6 +117,7 @@ class Usage(ProgramTest):
         operands = {"ptcbuild": [self.mesh, "-o", self.here / "o.ptcx"],
                     "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
                     "ptcshade": [self.scene, "-o", self.here / "o.ply"],
+                    "ptcbake": [self.scene, "-o", self.here / "o.png"],
                     "ptcrender": [self.scene, "-o", self.here / "o.png"],
                     "ptcconvert": [self.scene, self.here / "o.ptcx"]}
         for program, options in cases.items():

@@ -33,6 +33,7 @@ Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
     reflection_.resize(pixels, glm::vec3(0));
     reflection_occlusion_.resize(pixels, 0);
   }
+  if (extras.irradiance) irradiance_.resize(pixels, glm::vec3(0));
   for (const std::string& name : extras.shadows)
     shadows_.emplace_back(name, std::vector<float>(pixels));
 }
@@ -40,7 +41,7 @@ Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
 std::uint64_t Film::pixel_bytes(const FilmExtras& extras) noexcept {
   return 5 * sizeof(glm::vec3) + (extras.estimates ? 4 : 2) * sizeof(float) +
          (extras.glossy ? sizeof(glm::vec3) + sizeof(float) : 0) +
-         extras.shadows.size() * sizeof(float);
+         (extras.irradiance ? sizeof(glm::vec3) : 0) + extras.shadows.size() * sizeof(float);
 }
 
 void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight) {
@@ -53,7 +54,9 @@ void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading,
   bent_normal_[pixel] += weight * shading.bent_normal;
   albedo_[pixel] += weight * hit.albedo;
   occlusion_[pixel] += weight * shading.occlusion;
-  alpha_[pixel] += weight;
+  if (!hit.is_margin) alpha_[pixel] += weight;
+  if (!irradiance_.empty())
+    irradiance_[pixel] += weight * (hit.lamps + shading.sky + shading.irradiance);
 }
 
 void Film::add(std::size_t pixel, const ErrorEstimate& estimate, float weight) {
@@ -116,6 +119,8 @@ std::vector<Film::Layer> Film::layers() const {
     layers.push_back({{"reflection", Kind::colour, false}, flat(reflection_)});
     layers.push_back({{"reflection_occlusion", Kind::scalar, false}, reflection_occlusion_});
   }
+  if (!irradiance_.empty())
+    layers.push_back({{"irradiance", Kind::colour, false}, flat(irradiance_)});
   for (const auto& [name, shadow] : shadows_)
     layers.push_back({{name, Kind::scalar, false}, shadow});
   for (const auto& [name, light] : groups_)
@@ -136,9 +141,13 @@ std::vector<glm::vec3> Film::shown(std::string_view layer, unsigned row, unsigne
                                        : layer == "indirect"   ? indirect_
                                        : layer == "albedo"     ? albedo_
                                        : layer == "reflection" ? reflection_
+                                       : layer == "irradiance" ? irradiance_
                                                                : beauty_;
   const std::span<const glm::vec3> part = std::span(from).subspan(first, count);
   pixels.assign(part.begin(), part.end());
+  if (layer == "irradiance") {
+    for (glm::vec3& pixel : pixels) pixel *= std::numbers::inv_pi_v<float>;
+  }
   return pixels;
 }
 

@@ -19,13 +19,14 @@
 namespace ptc {
 
 /// The layers that a .png can show; `occlusion` is white where nothing covers.
-inline constexpr std::array<std::string_view, 6> kPictureLayers{
-    "beauty", "direct", "indirect", "occlusion", "albedo", "reflection"};
+inline constexpr std::array<std::string_view, 7> kPictureLayers{
+    "beauty", "direct", "indirect", "occlusion", "albedo", "reflection", "irradiance"};
 
 /// Layers that a picture has only when they are asked for.
 struct FilmExtras {
   bool estimates = false;            ///< occlusion_error and irradiance_error
   bool glossy = false;               ///< reflection and reflection_occlusion
+  bool irradiance = false;           ///< irradiance of lamps, sky and surfaces together
   std::vector<std::string> shadows;  ///< names of layers of shadows
 };
 
@@ -81,7 +82,10 @@ class Film {
   };
   /// Returns all layers, in the order of the file.
   [[nodiscard]] std::vector<Layer> layers() const;
-  /// Returns the values of a layer of a .png, one of kPictureLayers, in full.
+  /// Says whether the film has a layer of irradiance.
+  [[nodiscard]] bool has_irradiance() const noexcept { return !irradiance_.empty(); }
+  /// Returns the values of a layer of a .png, one of kPictureLayers, in full. Irradiance is shown
+  /// as the radiance of a white surface.
   /// @param row, rows  the rows of this film that are wanted
   [[nodiscard]] std::vector<glm::vec3> shown(std::string_view layer, unsigned row,
                                              unsigned rows) const;
@@ -96,6 +100,7 @@ class Film {
   std::vector<glm::vec3> reflection_;                                ///< empty without reflections
   std::vector<std::pair<std::string, std::vector<float>>> shadows_;  ///< layers by name
   std::vector<float> reflection_occlusion_;                          ///< empty without reflections
+  std::vector<glm::vec3> irradiance_;  ///< W / m^2; empty unless it is asked for
 };
 
 }  // namespace ptc

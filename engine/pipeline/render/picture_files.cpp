@@ -71,7 +71,7 @@ void PictureFiles::write(const Film& film) {
       pngs_[i]->write(pixels);
     }
     if (std::ranges::any_of(waiting_, [](const auto& light) { return light != nullptr; }))
-      meter_.add(film.shown("beauty", row, rows));
+      meter_.add(film.shown(film.has_irradiance() ? "irradiance" : "beauty", row, rows));
   }
 }
 

@@ -35,25 +35,8 @@ class MeshView : public PrimaryView {
     const auto hit =
         scene_.closest(camera_.position, direction, 0, std::numeric_limits<double>::infinity());
     if (!hit) return std::nullopt;
-    const float turn = hit->front ? 1.0F : -1.0F;
-    // Step back towards the camera, away from every surface that meets at the place: a receiver in
-    // an edge would else lie behind the discs of the other side, which are clear to it, or look
-    // through the gap that they leave along the edge
-    const glm::dvec3 place = hit->position - glm::dvec3(direction) * double{kStepBack * lift_};
-    const glm::dvec3 geometric(hit->geometric_normal * turn);
-    PrimaryHit primary{
-        .position = place,
-        .surface = hit->position + (geometric - glm::dvec3(direction)) * scene_.epsilon(),
-        .normal = hit->normal * turn,
-        .lift = lift_,
-        .offset_normal = hit->geometric_normal * turn,
-        .albedo = hit->albedo};
-    const std::uint64_t seed = std::uint64_t{y} << 32 | x;
-    const DirectLight::Result light =
-        light_.irradiance(primary.surface, primary.normal, sampling_, seed);
-    primary.direct = primary.albedo * light.local * std::numbers::inv_pi_v<float>;
-    if (hit->front) primary.direct += hit->emission;
-    return primary;
+    return seen_of_mesh(scene_, light_, sampling_, *hit, direction, lift_,
+                        std::uint64_t{y} << 32 | x);
   }
 
  private:
@@ -66,6 +49,27 @@ class MeshView : public PrimaryView {
 };
 
 }  // namespace
+
+PrimaryHit seen_of_mesh(const RayScene& scene, const DirectLight& light,
+                        const LightSampling& sampling, const SurfaceHit& at,
+                        const glm::vec3& towards, float lift, std::uint64_t seed) {
+  const float turn = at.front ? 1.0F : -1.0F;
+  // Step back towards the camera, away from every surface that meets at the place: a receiver in
+  // an edge would else lie behind the discs of the other side, which are clear to it, or look
+  // through the gap that they leave along the edge
+  const glm::dvec3 place = at.position - glm::dvec3(towards) * double{kStepBack * lift};
+  const glm::dvec3 geometric(at.geometric_normal * turn);
+  PrimaryHit primary{.position = place,
+                     .surface = at.position + (geometric - glm::dvec3(towards)) * scene.epsilon(),
+                     .normal = at.normal * turn,
+                     .lift = lift,
+                     .offset_normal = at.geometric_normal * turn,
+                     .albedo = at.albedo};
+  primary.lamps = light.irradiance(primary.surface, primary.normal, sampling, seed).local;
+  primary.direct = primary.albedo * primary.lamps * std::numbers::inv_pi_v<float>;
+  if (at.front) primary.direct += at.emission;
+  return primary;
+}
 
 std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene, const DirectLight& light,
                                        const LightSampling& sampling, const Camera& camera,

@@ -36,6 +36,9 @@ struct PrimaryHit {
   /// is left out, unless `sky_included` is set.
   glm::vec3 direct{0};
   bool sky_included = false;  ///< true when `direct` includes reflected light of the sky
+  /// Irradiance of the lamps on a mesh, and of emitters that are asked for it, W/m^2.
+  glm::vec3 lamps{0};
+  bool is_margin = false;  ///< true where a texture shows the surface next to it
 };
 
 /// A rectangle of the grid of samples of a picture.
@@ -75,6 +78,15 @@ class PrimaryView {
                                                      const LightSampling& sampling,
                                                      const Camera& camera, unsigned side,
                                                      float lift);
+
+/// Returns what a view shows of a place on a mesh, lit by shadow rays.
+/// @param at       `front` says which side is seen
+/// @param towards  direction in which it is looked at, unit
+/// @param lift     height of receivers above the mesh, scene units
+/// @param seed     fixes the sample points of the lights
+[[nodiscard]] PrimaryHit seen_of_mesh(const RayScene& scene, const DirectLight& light,
+                                      const LightSampling& sampling, const SurfaceHit& at,
+                                      const glm::vec3& towards, float lift, std::uint64_t seed);
 
 /// What a view of the surfels of a container may use.
 struct SurfelViewOptions {

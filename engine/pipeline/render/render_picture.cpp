@@ -43,6 +43,7 @@ struct Subject {
   PictureShadows shadows;
   bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
   std::unique_ptr<PrimaryView> view;
+  std::uint64_t texture_bytes = 0;  ///< of the view of a texture
 
   [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{camera.width} * camera.height; }
   [[nodiscard]] std::uint64_t samples() const { return pixels() * side * side; }
@@ -82,6 +83,7 @@ bool overlap(const Bounds& box, const Superblock& scene) {
 struct Part {
   bool emission = true;          ///< whether the meshes emit
   std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
+  TextureTile tile;              ///< that is baked, if it is a texture
 };
 
 /// Returns the memory for meshes. While they are read, only the sky takes any beside them.
@@ -120,7 +122,14 @@ void load_subject(Subject& subject, const RenderRequest& request, const Part& pa
     progress.note(
         "the meshes lie outside of the scene: is this the container that was built from them?");
   }
-  if (request.camera) {
+  if (request.texture) {
+    constexpr unsigned kSide = 1024;
+    require_request(!subject.mesh.triangles.empty(), "meshes",
+                    meshes.parts ? "the meshes do not fit in memory, as baking a texture asks for"
+                                 : "there is no mesh whose texture is to be baked");
+    const Bounds box = subject.mesh.bounds();
+    subject.camera = {.position = 0.5 * (box.low + box.high), .width = kSide, .height = kSide};
+  } else if (request.camera) {
     subject.camera = *request.camera;
   } else {
     std::optional<Bounds> box;
@@ -135,9 +144,31 @@ void load_subject(Subject& subject, const RenderRequest& request, const Part& pa
   check_size(subject.camera);
 }
 
+/// Makes a view of the texture of the subject's mesh, and notes what of it is not as one expects.
+void make_texture_view(Subject& subject, const RenderRequest& request,
+                       const LightSampling& sampling, float radius, float lift, const Part& part,
+                       const Executor& executor, Progress& progress) {
+  auto view = std::make_unique<TextureView>(*subject.rays, *subject.light, sampling,
+                                            glm::uvec2(subject.camera.width, subject.camera.height),
+                                            subject.side, radius, lift, *request.texture, part.tile,
+                                            executor);
+  subject.texture_bytes = view->bytes();
+  if (view->covered() == 0) {
+    progress.note("no texel lies on a surface: all texture coordinates are outside of the texture");
+  }
+  constexpr double kMuch = 1.05;  // a texel at the edge of an island counts as a whole
+  if (const double overlap = view->overlap(); overlap > kMuch) {
+    progress.note(fmt::format(
+        "parts of the meshes share texels, {:.2g} to one in the mean: each shows one of them",
+        overlap));
+  }
+  subject.view = std::move(view);
+}
+
 /// Makes a view of the subject's mesh by rays.
-void make_mesh_view(Subject& subject, const RenderRequest& request, const ContainerReader& scene,
-                    const LightRig& lights) {
+void make_mesh_view(Subject& subject, const RenderRequest& request, const Part& part,
+                    const Lighting& lighting, const LightRig& lights, Progress& progress) {
+  const ContainerReader& scene = lighting.scene();
   const double surfel_radius = surfel_spacing(scene) / std::numbers::sqrt2;
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);
@@ -147,9 +178,15 @@ void make_mesh_view(Subject& subject, const RenderRequest& request, const Contai
   subject.rays_at_emitters =
       lit_by_emitters(scene) && subject.mesh.emits() && sampling.area_rays > 0;
   if (!subject.rays_at_emitters) sampling.area_rays = 0;
-  subject.view =
-      view_mesh(*subject.rays, *subject.light, sampling, subject.camera, subject.side,
-                lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame));
+  const float lift =
+      lift_height(static_cast<float>(surfel_radius), request.lift, scene.header().frame);
+  if (request.texture) {
+    make_texture_view(subject, request, sampling, static_cast<float>(surfel_radius), lift, part,
+                      lighting.executor(), progress);
+  } else {
+    subject.view =
+        view_mesh(*subject.rays, *subject.light, sampling, subject.camera, subject.side, lift);
+  }
 }
 
 /// The memory of a view of surfels.
@@ -193,7 +230,9 @@ void make_surfel_view(Subject& subject, float lift, const SurfelViewBytes& bytes
 }
 
 FilmExtras extras_of(const RenderRequest& request) {
-  FilmExtras extras{.estimates = request.estimate, .glossy = request.glossy.roughness.has_value()};
+  FilmExtras extras{.estimates = request.estimate,
+                    .glossy = request.glossy.roughness.has_value(),
+                    .irradiance = request.texture.has_value()};
   for (const std::string& group : request.shadows) extras.shadows.push_back(shadow_channel(group));
   return extras;
 }
@@ -227,6 +266,7 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
   }
   if (subject.rays) {
     charge_mesh(budget, subject.mesh, subject.rays.get());
+    if (request.texture) budget.charge("the mesh in its texture", subject.texture_bytes);
   } else {
     budget.charge("the depth buffer", view.depth);
     if (view.pages > 0) budget.charge("pages that the camera sees", view.pages);
@@ -317,6 +357,9 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
           "targets",
           "the layer 'reflection' needs a roughness: ask for `glossy.roughness` as well");
     }
+    if (target.layer == "irradiance" && !request.texture) {
+      throw RequestError("targets", "a picture has no layer 'irradiance': only a texture has it");
+    }
     exr |= ending == ".exr";
   }
   if (!request.shadows.empty() && !exr) {
@@ -340,6 +383,8 @@ void check_request(const RenderRequest& request, std::span<const PictureTarget> 
   check_targets(request, targets);
   if (request.lights) check_lights(*request.lights);
   if (request.camera) check_camera(*request.camera, "camera");
+  require_request(!request.texture || !request.light_groups, "light_groups",
+                  "`light_groups` is for pictures: a texture has no layers for them");
   static_cast<void>(side_of(request.samples));
 }
 
@@ -360,7 +405,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   load_subject(subject, request, part, lighting.scene(), lights.sky, targets.front().path,
                progress);
   const bool sees_mesh = !subject.mesh.triangles.empty();
-  if (sees_mesh) make_mesh_view(subject, request, lighting.scene(), lights);
+  if (sees_mesh) make_mesh_view(subject, request, part, lighting, lights, progress);
   const std::vector<LightRig> rigs = rigs_of_groups(lights, request.shadows);
 
   // Divide the memory, shade earlier bounces, choose the settings
@@ -390,7 +435,10 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   // Render all samples
   {
     const Stage stage(report.seconds, progress, "render", subject.samples(), "samples");
-    TileRenderer({.camera = subject.camera, .side = subject.side, .view = *subject.view},
+    TileRenderer({.camera = subject.camera,
+                  .side = subject.side,
+                  .view = *subject.view,
+                  .sky = !request.texture},
                  subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting)
         .render_all(
             extras_of(request),
@@ -456,10 +504,9 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   return report;
 }
 
-/// Renders a picture of a container.
-LightingReport render_container(const RenderRequest& request,
-                                std::span<const PictureTarget> targets, Progress& progress) {
-  if (request.light_groups) return render_groups(request, targets, progress);
+/// Renders a picture of a container, or bakes one tile of a texture.
+LightingReport render_files(const RenderRequest& request, std::span<const PictureTarget> targets,
+                            const Part& part, Progress& progress) {
   std::optional<PictureFiles> files;
   std::optional<float> exposure;
   const auto write = [&](const Film& rows, unsigned first, const Camera& camera) {
@@ -470,9 +517,54 @@ LightingReport render_container(const RenderRequest& request,
     files->write(rows);
     if (first + rows.height() == camera.height) exposure = files->publish();
   };
-  LightingReport report = render_part(request, targets, {}, write, progress);
+  LightingReport report = render_part(request, targets, part, write, progress);
   report.exposure = exposure;
   return report;
+}
+
+/// Returns the targets of a tile: its number takes the place of kTileMark.
+std::vector<PictureTarget> targets_of(std::span<const PictureTarget> targets,
+                                      const TextureTile& tile) {
+  std::vector<PictureTarget> named(targets.begin(), targets.end());
+  for (PictureTarget& target : named) {
+    std::string name = target.path.string();
+    if (const std::size_t at = name.find(kTileMark); at != std::string::npos)
+      target.path = name.replace(at, kTileMark.size(), std::to_string(tile.number()));
+  }
+  return named;
+}
+
+/// Bakes each tile that the meshes lie in, or that from 0 to 1 where no name can tell them apart.
+LightingReport bake_tiles(const RenderRequest& request, std::span<const PictureTarget> targets,
+                          Progress& progress) {
+  const bool by_tiles = std::ranges::all_of(targets, [](const PictureTarget& target) {
+    return target.path.string().find(kTileMark) != std::string::npos;
+  });
+  Progress silent;
+  const std::vector<TextureTile> tiles = texture_tiles(
+      load_meshes(request.meshes, request.mesh.get(), request.backdrop,
+                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes")
+          .mesh);
+  if (!by_tiles || tiles.empty()) {
+    if (!tiles.empty() && (tiles.size() > 1 || tiles.front().number() != TextureTile{}.number())) {
+      progress.note(
+          fmt::format("the texture coordinates lie in {} tiles, of which this is 1001: "
+                      "{} in the name of each output stands for their numbers",
+                      tiles.size(), kTileMark));
+    }
+    return render_files(request, targets, {}, progress);
+  }
+  LightingReport report;
+  for (const TextureTile& tile : tiles)
+    add_costs(report, render_files(request, targets_of(targets, tile), {.tile = tile}, progress));
+  return report;
+}
+
+LightingReport render_container(const RenderRequest& request,
+                                std::span<const PictureTarget> targets, Progress& progress) {
+  if (request.light_groups) return render_groups(request, targets, progress);
+  if (request.texture) return bake_tiles(request, targets, progress);
+  return render_files(request, targets, {}, progress);
 }
 
 }  // namespace

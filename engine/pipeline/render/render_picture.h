@@ -17,12 +17,14 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/render/picture_files.h"
+#include "engine/pipeline/render/texture_view.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 
@@ -52,6 +54,11 @@ struct RenderRequest : LightingRequest {
   /// Shadow rays of each sample at a mesh. Its emitters are asked where they lit the surfels, too;
   /// else the gather brings their light, and no ray is cast at them.
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
+  /// Bakes a texture of the meshes, which must have texture coordinates, in place of a picture:
+  /// each texel is what its place on the surface looks like along the normal. `camera` is not used
+  /// then, `size` is 1024 x 1024 when it is empty, and `light_groups` is refused. Names of targets
+  /// may hold kTileMark: they stand for a file for each tile of the texture coordinates.
+  std::optional<TextureTarget> texture;
   /// Keeps the light of each group of lights apart, in a layer for each of an .exr. The scene is
   /// lit and rendered once for each; `error`, `estimate`, `glossy`, `shadows`, `check` and
   /// `tolerate_damage` keep their defaults then.
@@ -60,6 +67,9 @@ struct RenderRequest : LightingRequest {
   /// (spec/shading.md#display).
   std::optional<float> exposure;
 };
+
+/// What stands for the number of a tile in the name of a texture.
+inline constexpr std::string_view kTileMark = "<UDIM>";
 
 /// Renders a picture and writes it to one or more files.
 ///
@@ -75,14 +85,16 @@ struct RenderRequest : LightingRequest {
 ///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
 ///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
 ///   reflection_occlusion 1  only with LightingRequest::glossy, 0 to 1
+///   irradiance         3   only with `texture`: from lights, sky and surfaces, W / m^2
 ///   shadow_NAME        1   only with LightingRequest::shadows: share of a group's light that is
 ///                          hidden, 0 to 1; 0 where no surface is seen
 ///   light_NAME         3   only with `light_groups`: the beauty that is due to a group; the sum of
 ///                          all is the beauty
 ///
 /// An .exr gets all layers, a .png one of them. Each layer is the mean over the samples of a pixel,
-/// except that the layers of estimates are root mean squares, which are upper bounds on the error
-/// of that mean. Each file is published whole or not at all.
+/// except that `alpha` of a texture leaves out its margin, and that the layers of estimates are
+/// root mean squares, which are upper bounds on the error of that mean. Each file is published
+/// whole or not at all.
 /// @param targets   one or more files, all from one rendering
 /// @param progress  gets the stages, and notes about the meshes and the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was

@@ -125,7 +125,7 @@ void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& 
       if (!lit.reflections.empty()) film.add(pixel, lit.reflections[next], weight);
       film.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
       film.add(pixel, *hits_[i], lit.shading[next++], weight);
-    } else {
+    } else if (seen_.sky) {
       const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
       const auto [sx, sy] = sample_at(x, y, sample, side);
       const glm::vec3 direction = seen_.camera.direction((static_cast<float>(sx) + 0.5f) * scale,

@@ -26,6 +26,7 @@ struct SeenThrough {
   const Camera& camera;
   unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
   PrimaryView& view;
+  bool sky = true;  ///< whether samples that meet nothing show the sky, and else stay black
 };
 
 /// The shadows of groups of lights that a picture shows: those of a mesh or those of surfels, or

@@ -30,8 +30,8 @@ namespace ptc {
 ///       triangles             surface_patches.h       clusters.h             place(), reflected()
 ///
 /// The points measure a group: its area, mean normal, albedo and emission. The surfel lies at the
-/// middle of its group; the light is traced from 4 of the points, which share the surfel's rays. How
-/// far it must move from an edge is looked for only where no groups lie around it.
+/// middle of its group; the light is traced from 4 of the points, which share the surfel's rays.
+/// How far it must move from an edge is looked for only where no groups lie around it.
 ///
 /// Threads: sample() may be called concurrently.
 class PatchSampler {
