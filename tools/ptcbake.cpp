@@ -65,6 +65,7 @@ void declare(ptc::Command& command, Arguments& arguments) {
                    "Texels around an island that show its edge")
       ->group(kGroup);
   ptc::add_samples(app, request.samples)->group(kGroup);
+  ptc::add_exposure(app, request.exposure)->group(kGroup);
   arguments.lights.declare(app);
   ptc::add_bounces(app, request.bounces)->group("Lights");
   ptc::add_light_sampling(app, request.light_sampling);

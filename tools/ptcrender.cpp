@@ -81,11 +81,7 @@ void declare_picture(CLI::App& app, Arguments& arguments) {
       "By default the camera is that of the mesh. Without one it is the camera of the build, and "
       "without that, one that sees the whole scene, or all that stands on the backdrop.");
   ptc::add_samples(app, arguments.request.samples)->group(kGroup);
-  app.add_option("--exposure", arguments.request.exposure, "Exposure of a .png, without a curve")
-      ->type_name("STOPS")
-      ->check(ptc::in_range(-64, 64))
-      ->default_str("chosen, with a curve")
-      ->group(kGroup);
+  ptc::add_exposure(app, arguments.request.exposure)->group(kGroup);
 }
 
 void declare_lights(CLI::App& app, Arguments& arguments) {

@@ -363,6 +363,13 @@ CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
       ->check(check);
 }
 
+CLI::Option* add_exposure(CLI::App& app, std::optional<float>& exposure) {
+  return app.add_option("--exposure", exposure, "Exposure of a .png, without a curve")
+      ->type_name("STOPS")
+      ->check(in_range(-64, 64))
+      ->default_str("chosen, with a curve");
+}
+
 CLI::Option* add_samples(CLI::App& app, unsigned& samples) {
   return add_integer(app, "--samples", samples, 1, 4096, "Samples of each pixel, a square number")
       ->check(CLI::Validator(

@@ -349,6 +349,7 @@ std::uint32_t RayScene::occluded(const glm::dvec3& origin, std::span<const glm::
     rays.tfar[i] = local->far;
     rays.mask[i] = ~0U;
   }
+  if (std::ranges::all_of(valid, [](int v) { return v == 0; })) return 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   rtcOccluded16(valid.data(), impl_->scene, &context, &rays);

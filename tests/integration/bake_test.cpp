@@ -147,7 +147,11 @@ TEST_CASE("bake: each tile of the texture coordinates has a file of its own",
   add_square(mesh, 5, {1, 0}, {2, 1});
   add_square(mesh, 10, {3, 2}, {4, 3});
   Bake bake(mesh);
-  bake.run("a.<UDIM>.exr");
+  bake.request.check.receivers = 50;
+  const LightingReport report = bake.run("a.<UDIM>.exr");
+  CHECK(report.receivers == std::uint64_t{3} * kSide * kSide * bake.request.samples);
+  REQUIRE(report.check);
+  CHECK(report.check->receivers == 150);
   for (const char* name : {"a.1001.exr", "a.1002.exr", "a.1024.exr"}) {
     const auto albedo = test::read_layer(bake.path(name), "albedo");
     CHECK(albedo[kSide - 1].r == Approx(1 - 0.5 / kSide).margin(2e-3));

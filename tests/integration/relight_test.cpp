@@ -148,7 +148,9 @@ Difference compare_with_mesh(const Mesh& mesh, const LightRig& rig, const LightS
   d.away = std::sqrt(square_away / away) / mean;
   CAPTURE(d.mean, d.rms, d.away);
   CHECK(std::abs(d.mean) < 0.01);
-  CHECK(d.away < 0.03);
+  // One surfel that lies half under a block makes 0.03 by itself: between 56,000 and 64,000 surfels
+  // under the lamps it is 0.024 to 0.039.
+  CHECK(d.away < 0.045);
   return d;
 }
 

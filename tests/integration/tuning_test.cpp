@@ -94,6 +94,37 @@ TEST_CASE("error sums: the noise of the rays is separated from the error of the 
   CHECK(ErrorSums().error().relative() == 0);
 }
 
+TEST_CASE("error sums: the errors of two sets together are those of all their receivers",
+          "[integration][error]") {
+  std::mt19937 bits;
+  std::normal_distribution<float> normal;
+  ErrorSums first, second, both;
+  for (int i = 0; i < 3000; ++i) {
+    const bool early = i < 1000;
+    const float light = early ? 3.0F : 0.5F;
+    const auto rays = [&] {
+      return Shading{.occlusion = (early ? 0.2F : 0.7F) + 0.02F * normal(bits),
+                     .irradiance = glm::vec3(light * (1 + 0.02F * normal(bits))),
+                     .sky = glm::vec3(early ? 1.0F : 0.2F)};
+    };
+    const Shading ours{.occlusion = (early ? 0.25F : 0.66F) + 0.03F * normal(bits),
+                       .irradiance = glm::vec3(light * (early ? 1.1F : 0.8F))};
+    const Shading a = rays(), b = rays();
+    (early ? first : second).add(ours, a, b);
+    both.add(ours, a, b);
+  }
+  const CheckError e = pooled(first.error(), 1000, second.error(), 2000), all = both.error();
+  CHECK(e.occlusion_rms == Approx(all.occlusion_rms).epsilon(1e-6));
+  CHECK(e.occlusion_bias == Approx(all.occlusion_bias).epsilon(1e-6));
+  CHECK(e.occlusion_mean == Approx(all.occlusion_mean).epsilon(1e-6));
+  CHECK(e.occlusion_noise == Approx(all.occlusion_noise).epsilon(1e-6));
+  CHECK(e.irradiance_rms == Approx(all.irradiance_rms).epsilon(1e-6));
+  CHECK(e.irradiance_bias == Approx(all.irradiance_bias).epsilon(1e-6));
+  CHECK(e.irradiance_mean == Approx(all.irradiance_mean).epsilon(1e-6));
+  CHECK(e.irradiance_noise == Approx(all.irradiance_noise).epsilon(1e-6));
+  CHECK(e.sky_mean == Approx(all.sky_mean).epsilon(1e-6));
+}
+
 TEST_CASE("error: where little of the sky is seen, its light is off by more than occlusion",
           "[integration][error]") {
   // 2 % of the sky are open, and occlusion is off by half a percent of itself.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 namespace ptc {
 
@@ -36,5 +37,30 @@ struct CheckError {
     return std::max({occlusion_mean > 0 ? occlusion / occlusion_mean : 0.0, irradiance, of_sky});
   }
 };
+
+/// Returns the errors of two sets of receivers together.
+/// @param a_count, b_count  receivers of each set, not both 0
+[[nodiscard]] inline CheckError pooled(const CheckError& a, double a_count, const CheckError& b,
+                                       double b_count) noexcept {
+  const double share = b_count / (a_count + b_count);
+  const auto mean = [share](double x, double y) { return x + share * (y - x); };
+  const auto rms = [&](double x, double y) { return std::sqrt(mean(x * x, y * y)); };
+  CheckError sum;
+  sum.occlusion_rms = rms(a.occlusion_rms, b.occlusion_rms);
+  sum.occlusion_bias = mean(a.occlusion_bias, b.occlusion_bias);
+  sum.occlusion_mean = mean(a.occlusion_mean, b.occlusion_mean);
+  sum.occlusion_noise = rms(a.occlusion_noise, b.occlusion_noise);
+  // Errors of irradiance are shares of the mean
+  sum.irradiance_mean = mean(a.irradiance_mean, b.irradiance_mean);
+  sum.sky_mean = mean(a.sky_mean, b.sky_mean);
+  const double whole = sum.irradiance_mean > 0 ? sum.irradiance_mean : 1;
+  const auto of = [whole](double error, const CheckError& part) {
+    return error * part.irradiance_mean / whole;
+  };
+  sum.irradiance_rms = rms(of(a.irradiance_rms, a), of(b.irradiance_rms, b));
+  sum.irradiance_bias = mean(of(a.irradiance_bias, a), of(b.irradiance_bias, b));
+  sum.irradiance_noise = rms(of(a.irradiance_noise, a), of(b.irradiance_noise, b));
+  return sum;
+}
 
 }  // namespace ptc

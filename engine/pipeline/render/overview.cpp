@@ -26,11 +26,12 @@ constexpr double kLeftOut = 1.0 / 2000;  // of the area, to each side
 constexpr double kHeight = 0.35;         // of the camera, for 1 to the front
 constexpr double kMargin = 0.95;         // of half the picture, which the scene fills
 
-/// A part of the scene that is to be seen, a disc.
+/// A part of the scene that is to be seen: a disc, or a ball.
 struct Part {
   glm::dvec3 middle{0};
-  glm::dvec3 normal{0};  ///< unit
+  glm::dvec3 normal{0};  ///< unit; 0 for a ball
   double radius = 0;
+  double area = 0;  ///< scene units squared, about; 0: is never left out
 };
 
 /// Returns how high above the scene the camera stands, for 1 to the front: twice as high over flat
@@ -62,8 +63,13 @@ std::vector<Part> clusters_of(const ContainerReader& scene, unsigned level,
   std::vector<Surfel> block(kClusters);
   while (const std::size_t count = clusters->next(block)) {
     for (const Surfel& cluster : std::span(block).first(count)) {
-      if (box && !box->contains(cluster.position)) continue;
-      parts.push_back({cluster.position, glm::dvec3(cluster.normal), cluster.radius});
+      if (!box) {
+        parts.push_back({cluster.position, glm::dvec3(cluster.normal), cluster.radius,
+                         cluster.radius * cluster.radius});
+      } else if (box->contains(cluster.position)) {
+        // No point of a subject strayed, and a tip of it lies beyond the discs next to it
+        parts.push_back({.middle = cluster.position, .radius = cluster.radius});
+      }
     }
   }
   return parts;
@@ -91,10 +97,11 @@ double reach(const std::vector<Part>& parts, const glm::dvec3& direction) {
   std::vector<Reach> reaches;
   double left = 0;
   for (const Part& part : parts) {
-    const double aside = glm::length(glm::cross(part.normal, direction));
-    const double area = part.radius * part.radius;
-    reaches.push_back({glm::dot(part.middle, direction) + part.radius * aside, area});
-    left += area * kLeftOut;
+    const double aside = part.normal == glm::dvec3(0)
+                             ? glm::length(direction)
+                             : glm::length(glm::cross(part.normal, direction));
+    reaches.push_back({glm::dot(part.middle, direction) + part.radius * aside, part.area});
+    left += part.area * kLeftOut;
   }
   std::ranges::make_heap(reaches, {}, &Reach::at);
   const double farthest = reaches.front().at;

@@ -29,7 +29,7 @@ namespace ptc {
 namespace {
 
 // Bytes of a pixel of a tile (hit, receiver, result, order), and of what estimates add to it
-constexpr std::uint64_t kReceiverBytes = 320;
+constexpr std::uint64_t kReceiverBytes = 336;
 constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);
 
 /// The subject of a picture: the camera, what it sees and what lights it. The view refers to the
@@ -522,48 +522,26 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
   return report;
 }
 
-/// Returns the targets of a tile: its number takes the place of kTileMark.
-std::vector<PictureTarget> targets_of(std::span<const PictureTarget> targets,
-                                      const TextureTile& tile) {
-  std::vector<PictureTarget> named(targets.begin(), targets.end());
-  for (PictureTarget& target : named) {
-    std::string name = target.path.string();
-    if (const std::size_t at = name.find(kTileMark); at != std::string::npos)
-      target.path = name.replace(at, kTileMark.size(), std::to_string(tile.number()));
-  }
-  return named;
-}
-
-/// Bakes each tile that the meshes lie in, or that from 0 to 1 where no name can tell them apart.
-LightingReport bake_tiles(const RenderRequest& request, std::span<const PictureTarget> targets,
-                          Progress& progress) {
-  const bool by_tiles = std::ranges::all_of(targets, [](const PictureTarget& target) {
-    return target.path.string().find(kTileMark) != std::string::npos;
-  });
+/// Bakes the tiles of a texture of a container.
+LightingReport render_tiles(const RenderRequest& request, std::span<const PictureTarget> targets,
+                            Progress& progress) {
   Progress silent;
-  const std::vector<TextureTile> tiles = texture_tiles(
+  const LoadedMeshes meshes =
       load_meshes(request.meshes, request.mesh.get(), request.backdrop,
-                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes")
-          .mesh);
-  if (!by_tiles || tiles.empty()) {
-    if (!tiles.empty() && (tiles.size() > 1 || tiles.front().number() != TextureTile{}.number())) {
-      progress.note(
-          fmt::format("the texture coordinates lie in {} tiles, of which this is 1001: "
-                      "{} in the name of each output stands for their numbers",
-                      tiles.size(), kTileMark));
-    }
-    return render_files(request, targets, {}, progress);
-  }
-  LightingReport report;
-  for (const TextureTile& tile : tiles)
-    add_costs(report, render_files(request, targets_of(targets, tile), {.tile = tile}, progress));
-  return report;
+                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes");
+  return bake_tiles(
+      texture_tiles(meshes.mesh), targets,
+      [&](std::span<const PictureTarget> files, const TextureTile& tile) {
+        return render_files(request, files, {.tile = tile}, progress);
+      },
+      progress);
 }
 
+/// Renders a picture of a container, or bakes its textures.
 LightingReport render_container(const RenderRequest& request,
                                 std::span<const PictureTarget> targets, Progress& progress) {
   if (request.light_groups) return render_groups(request, targets, progress);
-  if (request.texture) return bake_tiles(request, targets, progress);
+  if (request.texture) return render_tiles(request, targets, progress);
   return render_files(request, targets, {}, progress);
 }
 

@@ -17,7 +17,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "engine/base/progress.h"
@@ -67,9 +66,6 @@ struct RenderRequest : LightingRequest {
   /// (spec/shading.md#display).
   std::optional<float> exposure;
 };
-
-/// What stands for the number of a tile in the name of a texture.
-inline constexpr std::string_view kTileMark = "<UDIM>";
 
 /// Renders a picture and writes it to one or more files.
 ///

@@ -6,8 +6,7 @@
 #include <atomic>
 #include <cmath>
 #include <optional>
-#include <set>
-#include <utility>
+#include <vector>
 
 #include <glm/geometric.hpp>
 
@@ -17,8 +16,7 @@
 namespace ptc {
 namespace {
 
-constexpr float kStepInwards = 0.6F;                  // radii of a surfel
-constexpr unsigned kTilesAlong = 10, kTilesUp = 100;  // that have numbers
+constexpr float kStepInwards = 0.6F;  // radii of a surfel
 
 bool is_finite(const glm::vec2& uv) {
   return std::isfinite(uv.x) && std::isfinite(uv.y);
@@ -62,20 +60,6 @@ std::vector<glm::ivec2> offsets_within(unsigned margin) {
 }
 
 }  // namespace
-
-std::vector<TextureTile> texture_tiles(const Mesh& mesh) {
-  std::set<std::pair<unsigned, unsigned>> found;  // v, u: by number
-  for (const auto& corners : mesh.triangles) {
-    if (mesh.uvs.empty()) break;
-    const glm::vec2 middle =
-        (mesh.uvs[corners[0]] + mesh.uvs[corners[1]] + mesh.uvs[corners[2]]) / 3.0F;
-    if (middle.x >= 0 && middle.y >= 0 && middle.x < kTilesAlong && middle.y < kTilesUp)
-      found.emplace(static_cast<unsigned>(middle.y), static_cast<unsigned>(middle.x));
-  }
-  std::vector<TextureTile> tiles;
-  for (const auto& [v, u] : found) tiles.push_back({{u, v}});
-  return tiles;
-}
 
 struct TextureView::Impl {
   Impl(const RayScene& rays, const DirectLight& lamps, const LightSampling& light_sampling,

@@ -3,12 +3,12 @@
 
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include <glm/vec2.hpp>
 
 #include "engine/base/executor.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/texture_tiles.h"
 
 namespace ptc {
 
@@ -18,19 +18,6 @@ struct TextureTarget {
   /// bring in black. 0 to 64.
   unsigned margin = 8;
 };
-
-/// A tile of the plane of texture coordinates, one texture for each (UDIM).
-struct TextureTile {
-  glm::uvec2 corner{0};  ///< texture coordinates of its low corner
-
-  /// Returns the number by which files are named: 1001 for the tile from 0 to 1, 1 more for each
-  /// tile along u, of which there are 10, and 10 more for each along v.
-  [[nodiscard]] unsigned number() const noexcept { return 1001 + corner.x + 10 * corner.y; }
-};
-
-/// Returns the tiles that the texture coordinates of a mesh lie in, by number. Coordinates outside
-/// of the 10 x 100 tiles that have numbers are left out.
-[[nodiscard]] std::vector<TextureTile> texture_tiles(const Mesh& mesh);
 
 /// The surface that a texture covers, seen along its normals.
 ///

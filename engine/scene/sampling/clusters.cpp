@@ -15,9 +15,8 @@
 //
 // The nearest middle of every point is the inner loop. Three things make it fast:
 //
-// - Points lie in cells as wide as clusters are apart (point_cells.h), so that the nearest middle
-// is
-//   in the point's cell or one around it. Cells and neighbours stay; middles move among them.
+// - Points lie in cells as wide as clusters are apart (point_cells.h): the nearest middle is in the
+//   point's cell or one around it. Cells and their neighbours stay; middles move among them.
 // - Points are visited cell by cell, so the middles around a cell are gathered once, in columns
 //   (near_clusters.h), and a loop without branches finds the nearest.
 // - The loop finds the least distance and its row in one number:

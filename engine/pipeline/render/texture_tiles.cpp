@@ -1,0 +1,87 @@
+#include "engine/pipeline/render/texture_tiles.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "engine/pipeline/light/group_scenes.h"
+
+namespace ptc {
+namespace {
+
+constexpr unsigned kTilesAlong = 10, kTilesUp = 100;  // that have numbers
+
+/// Returns the targets of a tile: its number takes the place of kTileMark.
+std::vector<PictureTarget> targets_of(std::span<const PictureTarget> targets,
+                                      const TextureTile& tile) {
+  std::vector<PictureTarget> named(targets.begin(), targets.end());
+  for (PictureTarget& target : named) {
+    std::string name = target.path.string();
+    if (const std::size_t at = name.find(kTileMark); at != std::string::npos)
+      target.path = name.replace(at, kTileMark.size(), std::to_string(tile.number()));
+  }
+  return named;
+}
+
+/// Adds the costs and the checked receivers of a tile.
+void add_tile(LightingReport& report, const LightingReport& tile) {
+  const std::uint64_t receivers = report.receivers + tile.receivers;
+  add_costs(report, tile);
+  report.receivers = receivers;
+  report.settings = tile.settings;
+  report.exposure = tile.exposure;
+  if (tile.tuning) report.tuning = tile.tuning;
+  if (!tile.check) return;
+  if (!report.check) {
+    report.check = tile.check;
+    return;
+  }
+  CheckReport& check = *report.check;
+  const auto before = static_cast<double>(check.receivers),
+             more = static_cast<double>(tile.check->receivers);
+  check.discs = pooled(check.discs, before, tile.check->discs, more);
+  if (check.mesh && tile.check->mesh)
+    check.mesh = pooled(*check.mesh, before, *tile.check->mesh, more);
+  check.receivers += tile.check->receivers;
+}
+
+}  // namespace
+
+std::vector<TextureTile> texture_tiles(const Mesh& mesh) {
+  std::set<std::pair<unsigned, unsigned>> found;  // v, u: by number
+  for (const auto& corners : mesh.triangles) {
+    if (mesh.uvs.empty()) break;
+    const glm::vec2 middle =
+        (mesh.uvs[corners[0]] + mesh.uvs[corners[1]] + mesh.uvs[corners[2]]) / 3.0F;
+    if (middle.x >= 0 && middle.y >= 0 && middle.x < kTilesAlong && middle.y < kTilesUp)
+      found.emplace(static_cast<unsigned>(middle.y), static_cast<unsigned>(middle.x));
+  }
+  std::vector<TextureTile> tiles;
+  for (const auto& [v, u] : found) tiles.push_back({{u, v}});
+  return tiles;
+}
+
+LightingReport bake_tiles(std::span<const TextureTile> tiles,
+                          std::span<const PictureTarget> targets, const BakeTile& bake,
+                          Progress& progress) {
+  const bool marked = std::ranges::all_of(targets, [](const PictureTarget& target) {
+    return target.path.string().find(kTileMark) != std::string::npos;
+  });
+  if (!marked || tiles.empty()) {
+    if (tiles.size() > 1 || (!tiles.empty() && tiles.front().number() != TextureTile{}.number())) {
+      progress.note(
+          fmt::format("the texture coordinates lie in {} tile{}, and this is 1001: {} in the name "
+                      "of each output stands for their numbers",
+                      tiles.size(), tiles.size() == 1 ? "" : "s", kTileMark));
+    }
+    return bake(targets, {});
+  }
+  LightingReport report;
+  for (const TextureTile& tile : tiles) add_tile(report, bake(targets_of(targets, tile), tile));
+  return report;
+}
+
+}  // namespace ptc
