@@ -1,5 +1,6 @@
 // Textures that are baked: where texels lie, what they hold, and what is refused.
 #include <filesystem>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -162,6 +163,44 @@ TEST_CASE("bake: each tile of the texture coordinates has a file of its own",
   bake.run("b.exr");
   REQUIRE(bake.notes.texts.size() == 1);
   CHECK_THAT(bake.notes.texts[0], Catch::Contains("3 tiles"));
+}
+
+TEST_CASE("bake: coordinates that are far away or no numbers leave the others as they are",
+          "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {0, 0}, {1, 1});
+  for (const float far : {3e4F, 1e30F, std::numeric_limits<float>::infinity(),
+                          std::numeric_limits<float>::quiet_NaN()}) {
+    add_square(mesh, 5 + static_cast<float>(mesh.uvs.size()), {far, far}, {far + 1, far + 1});
+  }
+  Bake bake(mesh);
+  bake.run();
+  const auto albedo = test::read_layer(bake.path("a.exr"), "albedo");
+  for (unsigned x = 0; x < kSide; ++x)
+    CHECK(albedo[x].r == Approx((static_cast<float>(x) + 0.5F) / kSide).margin(2e-3));
+}
+
+TEST_CASE("bake: a triangle whose coordinates repeat shows its place in the tile",
+          "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {-3, -3}, {5, 5});
+  Bake bake(mesh);
+  bake.run();
+  const auto albedo = test::read_layer(bake.path("a.exr"), "albedo");
+  for (unsigned x = 0; x < kSide; ++x) {
+    const float u = (static_cast<float>(x) + 0.5F) / kSide;
+    CHECK(albedo[x].r == Approx((u + 3) / 8).margin(2e-3));
+  }
+}
+
+TEST_CASE("bake: a cap that is too small for the mesh and its texture is refused",
+          "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {0, 0}, {1, 1});
+  Bake bake(mesh);
+  bake.request.size = {16384, 16384};
+  bake.request.run.memory_bytes = std::uint64_t{40} << 20;
+  CHECK_THROWS_WITH(bake.run(), Catch::Contains("the mesh in its texture"));
 }
 
 TEST_CASE("bake: parts that share texels are noted", "[integration][bake]") {

@@ -148,6 +148,11 @@ void load_subject(Subject& subject, const RenderRequest& request, const Part& pa
 void make_texture_view(Subject& subject, const RenderRequest& request,
                        const LightSampling& sampling, float radius, float lift, const Part& part,
                        const Executor& executor, Progress& progress) {
+  const glm::uvec2 size(subject.camera.width, subject.camera.height);
+  MemoryBudget budget = budget_of(request.run.memory_bytes, "this texture");
+  charge_mesh(budget, subject.mesh, subject.rays.get());
+  budget.charge("the mesh in its texture", TextureView::bytes_for(*subject.rays, size));
+  budget.require();
   auto view = std::make_unique<TextureView>(*subject.rays, *subject.light, sampling,
                                             glm::uvec2(subject.camera.width, subject.camera.height),
                                             subject.side, radius, lift, *request.texture, part.tile,

@@ -18,31 +18,37 @@ namespace {
 
 constexpr float kStepInwards = 0.6F;  // radii of a surfel
 
-bool is_finite(const glm::vec2& uv) {
-  return std::isfinite(uv.x) && std::isfinite(uv.y);
-}
-
 /// Returns the mesh whose positions are texture coordinates in texels, from the upper left corner
-/// of a tile, with the triangles of `mesh`. A triangle that lies nowhere has no area.
+/// of a tile, with the triangles of `mesh`. A triangle that has no place in the tile has no area.
 Mesh flattened(const Mesh& mesh, const glm::uvec2& size, const TextureTile& tile) {
+  constexpr double kFarthest = 1 << 22;  // texels; beyond it floats do not tell two texels apart
+  const glm::dvec2 texels(size);
+  const auto place = [&](std::uint32_t vertex) {
+    const glm::dvec2 at = (glm::dvec2(mesh.uvs[vertex]) - glm::dvec2(tile.corner)) * texels;
+    return glm::dvec2(at.x, texels.y - at.y);
+  };
   Mesh flat;
   flat.materials.resize(1);
   flat.positions.resize(mesh.positions.size(), glm::vec3(0));
-  const glm::dvec2 texels(size);
-  for (std::size_t i = 0; i < mesh.uvs.size(); ++i) {
-    if (!is_finite(mesh.uvs[i])) continue;
-    const glm::dvec2 at = (glm::dvec2(mesh.uvs[i]) - glm::dvec2(tile.corner)) * texels;
-    // What is far away is not seen, and must not make what is near less precise
-    const double far = 64.0 * static_cast<double>(std::max(size.x, size.y));
-    flat.positions[i] = glm::vec3(glm::clamp(glm::dvec2(at.x, texels.y - at.y), -far, far), 0.0F);
-  }
-  flat.triangles = mesh.triangles;
-  for (auto& corners : flat.triangles) {
-    const bool known = std::ranges::all_of(
-        corners, [&](std::uint32_t corner) { return is_finite(mesh.uvs[corner]); });
-    if (!known) corners = {corners[0], corners[0], corners[0]};
-  }
   flat.material_of.resize(mesh.triangles.size(), 0);
+  flat.triangles.reserve(mesh.triangles.size());
+  for (const auto& corners : mesh.triangles) {
+    glm::dvec2 low(kFarthest), high(-kFarthest);
+    bool near = true;
+    for (const std::uint32_t corner : corners) {
+      const glm::dvec2 at = place(corner);
+      near = near && std::abs(at.x) < kFarthest && std::abs(at.y) < kFarthest;  // false for a NaN
+      low = glm::min(low, at);
+      high = glm::max(high, at);
+    }
+    if (!near || high.x < 0 || high.y < 0 || low.x > texels.x || low.y > texels.y) {
+      flat.triangles.push_back({corners[0], corners[0], corners[0]});
+      continue;
+    }
+    flat.triangles.push_back(corners);
+    for (const std::uint32_t corner : corners)
+      flat.positions[corner] = glm::vec3(glm::vec2(place(corner)), 0.0F);
+  }
   return flat;
 }
 
@@ -153,6 +159,10 @@ std::optional<PrimaryHit> TextureView::at(unsigned x, unsigned y) const {
   hit.position += impl_->step_inwards(surface);
   hit.is_margin = is_margin;
   return hit;
+}
+
+std::uint64_t TextureView::bytes_for(const RayScene& scene, glm::uvec2 size) noexcept {
+  return bytes_of(scene.mesh()) + scene.bytes() + std::uint64_t{(size.x + 7) / 8} * size.y;
 }
 
 std::uint64_t TextureView::bytes() const noexcept {

@@ -46,7 +46,9 @@ class TextureView : public PrimaryView {
 
   [[nodiscard]] std::optional<PrimaryHit> at(unsigned x, unsigned y) const override;
 
-  /// Returns the bytes that the view takes beside the mesh.
+  /// Returns the bytes that a view will take beside the mesh and its rays, about.
+  [[nodiscard]] static std::uint64_t bytes_for(const RayScene& scene, glm::uvec2 size) noexcept;
+  /// Returns the bytes that the view takes beside the mesh and its rays.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
   /// Returns the share of the texels that show a surface themselves, 0 to 1.
   [[nodiscard]] double covered() const noexcept;
