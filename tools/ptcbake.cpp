@@ -1,6 +1,6 @@
 // ptcbake: bakes the light of a scene into a texture of its meshes.
-#include <algorithm>
-#include <span>
+#include <array>
+#include <string_view>
 
 #include "engine/base/error.h"
 #include "engine/pipeline/budgets.h"

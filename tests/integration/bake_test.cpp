@@ -253,6 +253,19 @@ TEST_CASE("bake: what cannot be baked is refused", "[integration][bake]") {
     bake.request.texture->margin = 65;
     refused("texture.margin", "above 64");
   }
+  SECTION("into a file for each tile where no tile has a number") {
+    Mesh below = mesh;
+    for (glm::vec2& uv : below.uvs) uv -= glm::vec2(5);
+    bake.request.mesh = std::make_shared<Mesh>(below);
+    CHECK_THROWS_WITH(bake.run("b.<UDIM>.exr"), Catch::Contains("stands for nothing"));
+    CHECK(!std::filesystem::exists(bake.path("b.<UDIM>.exr")));
+  }
+  SECTION("into names of which one alone holds the number of a tile") {
+    const std::vector<PictureTarget> targets{{bake.path("b.<UDIM>.exr")},
+                                             {bake.path("b.png"), "albedo"}};
+    CHECK_THROWS_WITH(render_picture(bake.request, targets, bake.notes),
+                      Catch::Contains("or none does"));
+  }
   SECTION("by groups of lights") {
     bake.request.light_groups = true;
     refused("light_groups", "for pictures");

@@ -159,7 +159,9 @@ void make_texture_view(Subject& subject, const RenderRequest& request,
                                             executor);
   subject.texture_bytes = view->bytes();
   if (view->covered() == 0) {
-    progress.note("no texel lies on a surface: all texture coordinates are outside of the texture");
+    progress.note(
+        "no middle of a texel lies on a surface: the texture coordinates are outside of the "
+        "texture, or cover too little of it");
   }
   constexpr double kMuch = 1.05;  // a texel at the edge of an island counts as a whole
   if (const double overlap = view->overlap(); overlap > kMuch) {
@@ -531,11 +533,13 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
 LightingReport render_tiles(const RenderRequest& request, std::span<const PictureTarget> targets,
                             Progress& progress) {
   Progress silent;
-  const LoadedMeshes meshes =
+  const std::vector<TextureTile> tiles = texture_tiles(
       load_meshes(request.meshes, request.mesh.get(), request.backdrop,
-                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes");
+                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes")
+          .mesh);
+  return_freed_memory();  // of the meshes, which each tile reads for itself
   return bake_tiles(
-      texture_tiles(meshes.mesh), targets,
+      tiles, targets,
       [&](std::span<const PictureTarget> files, const TextureTile& tile) {
         return render_files(request, files, {.tile = tile}, progress);
       },

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
 #include "engine/pipeline/light/group_scenes.h"
 
 namespace ptc {
@@ -33,8 +34,10 @@ void add_tile(LightingReport& report, const LightingReport& tile) {
   report.receivers = receivers;
   report.settings = tile.settings;
   report.exposure = tile.exposure;
-  if (tile.tuning) report.tuning = tile.tuning;
-  if (!tile.check) return;
+  // Tell of the tile that is farthest from what was asked
+  if (tile.tuning && (!report.tuning || report.tuning->met)) report.tuning = tile.tuning;
+  if (tile.damage && (!report.damage || report.damage->pages.empty())) report.damage = tile.damage;
+  if (!tile.check || tile.check->receivers == 0) return;
   if (!report.check) {
     report.check = tile.check;
     return;
@@ -70,7 +73,19 @@ LightingReport bake_tiles(std::span<const TextureTile> tiles,
   const bool marked = std::ranges::all_of(targets, [](const PictureTarget& target) {
     return target.path.string().find(kTileMark) != std::string::npos;
   });
-  if (!marked || tiles.empty()) {
+  const bool any_marked = std::ranges::any_of(targets, [](const PictureTarget& target) {
+    return target.path.string().find(kTileMark) != std::string::npos;
+  });
+  if (any_marked && !marked) {
+    throw RequestError("targets",
+                       fmt::format("the names of all outputs hold {}, or none does", kTileMark));
+  }
+  if (marked && tiles.empty()) {
+    throw RequestError("targets", fmt::format("no triangle lies in a tile that has a number, so "
+                                              "that {} stands for nothing",
+                                              kTileMark));
+  }
+  if (!marked) {
     if (tiles.size() > 1 || (!tiles.empty() && tiles.front().number() != TextureTile{}.number())) {
       progress.note(
           fmt::format("the texture coordinates lie in {} tile{}, and this is 1001: {} in the name "

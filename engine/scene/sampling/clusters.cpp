@@ -243,6 +243,7 @@ class Lloyd {
       const SurfacePoint& p = points_[sums_[largest[i]].any];
       clusters_[lost[i]] = {p.position, p.normal, p.kind};
       levels_[lost[i]] = levels_[largest[i]];
+      sums_[lost[i]].any = sums_[largest[i]].any;
     }
   }
 
