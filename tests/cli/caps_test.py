@@ -53,6 +53,12 @@ class Caps(ProgramTest):
         self.assertIn("the meshes do not fit in memory", said)
         self.succeed("ptcverify", self.here / "o.ptcx")
 
+    def test_a_mesh_that_fits_is_seen_and_not_its_surfels(self):
+        mesh = self.here / "waves.ply"
+        self.write_waves(mesh, 700)  # a million triangles: 33 MB of mesh and some 80 of rays
+        said = self.peak(0, 512, "ptcrender", self.scene, "--mesh", mesh, "--size", "64x36", "-o", self.here / "o.png")
+        self.assertNotIn("do not fit", said)
+
     def test_128_mib_are_enough_for_any_number_of_threads(self):
         mesh = self.here / "small.ply"
         for side in (20, 70, 200):

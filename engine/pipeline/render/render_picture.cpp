@@ -96,7 +96,7 @@ MeshLimits mesh_limits(const RenderRequest& request, const Sky& sky,
   charge_sky(budget, sky);
   const std::uint64_t left = budget.left();
   return {.reading = left,
-          .kept = kLeast,
+          .kept = std::max(left / 4, kLeast),
           .traced = std::max(left > kOthers ? left - kOthers : 0, kLeast),
           .textures = texture_cap(request.run),
           .temp_directory = roomiest_temp_dir(request.run, target)};
