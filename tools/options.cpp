@@ -381,4 +381,12 @@ void add_check_options(CLI::App& app, CheckRequest& check) {
       ->group("Quality");
 }
 
+void add_quality_options(CLI::App& app, LightingRequest& request) {
+  add_gather_options(app, request.gather, request.lift);
+  add_error_option(app, request.error);
+  add_check_options(app, request.check);
+  add_estimate_option(app, request.estimate);
+  add_tolerate_damage(app, request.tolerate_damage);
+}
+
 }  // namespace ptc

@@ -92,4 +92,8 @@ void add_light_groups(CLI::App& app, bool& groups, const std::string& where);
 /// Declares --check N and --check-rays N.
 void add_check_options(CLI::App& app, CheckRequest& check);
 
+/// Declares what decides how exact a run is, and what is told of it: the options of the gather,
+/// --error, --check, --estimate and --tolerate-damage.
+void add_quality_options(CLI::App& app, LightingRequest& request);
+
 }  // namespace ptc

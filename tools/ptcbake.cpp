@@ -81,15 +81,7 @@ ptc::Outcome bake(Arguments& arguments, const ptc::RunOptions& run, ptc::Progres
     request.lights = arguments.lights.rig(ptc::up_of_files(ptc::scene_files(request), request.up),
                                           *ptc::texture_store(run, arguments.outputs.front()));
   }
-  std::vector<ptc::PictureTarget> targets;
-  std::vector<std::string> names;
-  for (const auto& output : arguments.outputs) targets.push_back({.path = output});
-  targets.insert(targets.end(), arguments.layers.begin(), arguments.layers.end());
-  for (const ptc::PictureTarget& target : targets) names.push_back(target.path.string());
-  const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
-  nlohmann::ordered_json facts{{"outputs", names}};
-  facts.update(ptc::facts_of(report));
-  return {facts, ptc::shade_text(ptc::join(names, ", "), report)};
+  return ptc::render_files(request, arguments.outputs, arguments.layers, progress);
 }
 
 }  // namespace
@@ -101,11 +93,7 @@ int main(int argc, char** argv) {
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(command.app(), preset);
   ptc::add_surroundings(command.app(), arguments.request.gather.around);
-  ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
-  ptc::add_error_option(command.app(), arguments.request.error);
-  ptc::add_check_options(command.app(), arguments.request.check);
-  ptc::add_estimate_option(command.app(), arguments.request.estimate);
-  ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
+  ptc::add_quality_options(command.app(), arguments.request);
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     ptc::apply_preset(command.app(), preset, arguments.request);

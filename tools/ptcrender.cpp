@@ -116,17 +116,7 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
     }
     if (request.camera) request.camera->up = up;
   }
-  std::vector<ptc::PictureTarget> targets = arguments.layers;
-  for (const auto& output : arguments.outputs) targets.push_back({.path = output});
-  const ptc::LightingReport report = ptc::render_picture(request, targets, progress);
-  std::vector<std::string> names;
-  for (const ptc::PictureTarget& target : targets) names.push_back(target.path.string());
-  // Outputs stand behind layers in `targets`; the summary names them first.
-  std::vector<std::string> told = names;
-  std::ranges::rotate(told, told.begin() + static_cast<std::ptrdiff_t>(arguments.layers.size()));
-  nlohmann::ordered_json facts{{"outputs", names}};
-  facts.update(ptc::facts_of(report));
-  return {facts, ptc::shade_text(ptc::join(told, ", "), report)};
+  return ptc::render_files(request, arguments.outputs, arguments.layers, progress);
 }
 
 }  // namespace
@@ -141,11 +131,7 @@ int main(int argc, char** argv) {
   ptc::add_preset(command.app(), preset);
   ptc::add_surroundings(command.app(), arguments.request.gather.around);
   ptc::add_glossy(command.app(), arguments.request.glossy, "layer");
-  ptc::add_gather_options(command.app(), arguments.request.gather, arguments.request.lift);
-  ptc::add_error_option(command.app(), arguments.request.error);
-  ptc::add_check_options(command.app(), arguments.request.check);
-  ptc::add_estimate_option(command.app(), arguments.request.estimate);
-  ptc::add_tolerate_damage(command.app(), arguments.request.tolerate_damage);
+  ptc::add_quality_options(command.app(), arguments.request);
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     ptc::apply_preset(command.app(), preset, arguments.request);

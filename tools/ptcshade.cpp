@@ -96,11 +96,7 @@ int main(int argc, char** argv) {
       ->type_name("X,Y,Z")
       ->needs("--glossy")
       ->group("Reflections");
-  ptc::add_gather_options(app, request.gather, request.lift);
-  ptc::add_error_option(app, request.error);
-  ptc::add_check_options(app, request.check);
-  ptc::add_estimate_option(app, request.estimate);
-  ptc::add_tolerate_damage(app, request.tolerate_damage);
+  ptc::add_quality_options(app, request);
   ptc::add_back_end(app, request.back_end);
 
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {

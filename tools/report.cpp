@@ -11,13 +11,14 @@
 // says CPU, sizes in bytes, errors as shares of a mean unless they are absolute.
 #include "tools/report.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include <fmt/format.h>
 
 #include "engine/base/progress_text.h"
 #include "format/text.h"
-#include "tools/common.h"
+#include "tools/option_text.h"
 
 namespace ptc {
 
@@ -317,6 +318,22 @@ std::string stages_text(const StageSeconds& seconds) {
     text += fmt::format("{}{} {:.2f} s", text.empty() ? "  " : ", ", stage, time);
   }
   return text.empty() ? text : text + "\n";
+}
+
+Outcome render_files(const RenderRequest& request,
+                     const std::vector<std::filesystem::path>& outputs,
+                     const std::vector<PictureTarget>& layers, Progress& progress) {
+  std::vector<PictureTarget> targets = layers;
+  for (const auto& output : outputs) targets.push_back({.path = output});
+  const LightingReport report = render_picture(request, targets, progress);
+  std::vector<std::string> names;
+  for (const PictureTarget& target : targets) names.push_back(target.path.string());
+  // Outputs stand behind layers in `targets`; the summary names them first.
+  std::vector<std::string> told = names;
+  std::ranges::rotate(told, told.begin() + static_cast<std::ptrdiff_t>(layers.size()));
+  nlohmann::ordered_json facts{{"outputs", names}};
+  facts.update(facts_of(report));
+  return {facts, shade_text(join(told, ", "), report)};
 }
 
 }  // namespace ptc

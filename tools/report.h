@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/ptc.h"
+#include "tools/common.h"
 
 namespace ptc {
 
@@ -42,5 +43,11 @@ namespace ptc {
 [[nodiscard]] std::string bytes_text(std::uint64_t bytes);
 /// A line of the stages in their order, "  read 1.20 s, sort 3.40 s"; empty without stages.
 [[nodiscard]] std::string stages_text(const StageSeconds& seconds);
+
+/// Renders pictures, or bakes textures, and reports them.
+/// @param layers  pictures of single layers, beside the outputs
+[[nodiscard]] Outcome render_files(const RenderRequest& request,
+                                   const std::vector<std::filesystem::path>& outputs,
+                                   const std::vector<PictureTarget>& layers, Progress& progress);
 
 }  // namespace ptc

@@ -70,13 +70,11 @@ std::vector<TextureTile> texture_tiles(const Mesh& mesh) {
 LightingReport bake_tiles(std::span<const TextureTile> tiles,
                           std::span<const PictureTarget> targets, const BakeTile& bake,
                           Progress& progress) {
-  const bool marked = std::ranges::all_of(targets, [](const PictureTarget& target) {
+  const auto names = std::ranges::count_if(targets, [](const PictureTarget& target) {
     return target.path.string().find(kTileMark) != std::string::npos;
   });
-  const bool any_marked = std::ranges::any_of(targets, [](const PictureTarget& target) {
-    return target.path.string().find(kTileMark) != std::string::npos;
-  });
-  if (any_marked && !marked) {
+  const bool marked = names > 0;
+  if (marked && names != std::ssize(targets)) {
     throw RequestError("targets",
                        fmt::format("the names of all outputs hold {}, or none does", kTileMark));
   }

@@ -3,6 +3,7 @@
 #include "engine/pipeline/render/texture_view.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <optional>
@@ -33,21 +34,18 @@ Mesh flattened(const Mesh& mesh, const glm::uvec2& size, const TextureTile& tile
   flat.material_of.resize(mesh.triangles.size(), 0);
   flat.triangles.reserve(mesh.triangles.size());
   for (const auto& corners : mesh.triangles) {
-    glm::dvec2 low(kFarthest), high(-kFarthest);
-    bool near = true;
-    for (const std::uint32_t corner : corners) {
-      const glm::dvec2 at = place(corner);
-      near = near && std::abs(at.x) < kFarthest && std::abs(at.y) < kFarthest;  // false for a NaN
-      low = glm::min(low, at);
-      high = glm::max(high, at);
-    }
+    const std::array at{place(corners[0]), place(corners[1]), place(corners[2])};
+    const bool near = std::ranges::all_of(at, [](const glm::dvec2& p) {
+      return std::abs(p.x) < kFarthest && std::abs(p.y) < kFarthest;  // false for a NaN
+    });
+    const glm::dvec2 low = glm::min(at[0], glm::min(at[1], at[2])),
+                     high = glm::max(at[0], glm::max(at[1], at[2]));
     if (!near || high.x < 0 || high.y < 0 || low.x > texels.x || low.y > texels.y) {
       flat.triangles.push_back({corners[0], corners[0], corners[0]});
       continue;
     }
     flat.triangles.push_back(corners);
-    for (const std::uint32_t corner : corners)
-      flat.positions[corner] = glm::vec3(glm::vec2(place(corner)), 0.0F);
+    for (std::size_t k = 0; k < 3; ++k) flat.positions[corners[k]] = glm::vec3(at[k], 0);
   }
   return flat;
 }
@@ -106,8 +104,12 @@ struct TextureView::Impl {
   /// Returns the step of a receiver away from the edge of its triangle, towards its middle. Right
   /// at a wall it would look through a gap between two discs of the other one.
   [[nodiscard]] glm::dvec3 step_inwards(const SurfaceHit& at) const {
-    const SurfaceHit middle = scene.surface(at.triangle, 1 / 3.0F, 1 / 3.0F);
-    const glm::dvec3 way = middle.position - at.position;
+    const Mesh& mesh = scene.mesh();
+    const auto& [a, b, c] = mesh.triangles[at.triangle];
+    const glm::dvec3 middle = (glm::dvec3(mesh.positions[a]) + glm::dvec3(mesh.positions[b]) +
+                               glm::dvec3(mesh.positions[c])) /
+                              3.0;
+    const glm::dvec3 way = mesh.origin + middle - at.position;
     const double length = glm::length(way);
     return length > 0 ? way * std::min(1.0, double{kStepInwards * radius} / length) : way;
   }

@@ -33,10 +33,11 @@ struct TextureTarget {
 class TextureView : public PrimaryView {
  public:
   /// @param scene, light  of a mesh with texture coordinates; must outlive the view
-  /// @param width, height  of the texture, texels
+  /// @param size    width and height of the texture, texels
   /// @param side    samples along the side of a texel
-  /// @param radius  of the surfels, scene units; receivers keep about a third of it from edges of
-  ///                triangles that are as large
+  /// @param radius  of the surfels, scene units; receivers step 0.6 of it towards the middle of
+  /// their
+  ///                triangle, or up to there
   /// @param lift    height of receivers above the mesh, scene units
   /// @throws RequestError when the mesh has no texture coordinates
   TextureView(const RayScene& scene, const DirectLight& light, const LightSampling& sampling,

@@ -38,6 +38,7 @@ class DirectLight {
                                   const LightSampling& sampling, std::uint64_t seed) const;
   /// Estimates the irradiance at a point whose rays begin where the caller says.
   /// @param origin  scene units, as step_off() returns it
+  /// @param normal  of any length but 0
   [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::dvec3& origin,
                                   const glm::vec3& normal, const LightSampling& sampling,
                                   std::uint64_t seed) const;

@@ -30,7 +30,6 @@ class ClusterColumns {
   static constexpr std::size_t kLanes = 16;  ///< floats in the widest vector
 
   void clear() { size_ = 0; }
-  [[nodiscard]] std::size_t size() const { return size_; }
 
   /// @param index  of the cluster
   void add(std::uint32_t index, const Cluster& cluster) {
@@ -75,7 +74,7 @@ class ClusterColumns {
   // Cosine between a point's normal and its cluster's, at least: surfaces that turn by more than
   // 75 degrees do not share a cluster.
   static constexpr float kMinCosine = 0.26F;
-  static constexpr float kNever = 1e36F;  // finite, and greater than every squared distance
+  static constexpr float kNever = 1e36F;  // finite, and greater than any distance that counts
   static constexpr float kNobody = 8;     // kind of no point
   static constexpr std::size_t kRows = 256;
   static constexpr std::int32_t kRowMask = 255;
