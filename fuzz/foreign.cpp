@@ -51,9 +51,7 @@ void read_picture(const Path& path) {
   check(read_image(path));
 }
 
-void read_mesh_file(const Path& path) {
-  const MeshFile file = read_mesh(path);
-  const Mesh& mesh = file.mesh;
+void check(const Mesh& mesh) {
   const std::size_t vertices = mesh.positions.size();
   require(!mesh.triangles.empty() && mesh.material_of.size() == mesh.triangles.size() &&
           !mesh.materials.empty());
@@ -68,6 +66,15 @@ void read_mesh_file(const Path& path) {
   for (const Material& material : mesh.materials) {
     require(is_finite(material.albedo) && is_finite(material.emission));
     if (material.texture) check(*material.texture);
+  }
+}
+
+void read_mesh_file(const Path& path) {
+  const MeshFile file = read_mesh(path);
+  if (file.placed.empty() || !file.mesh.triangles.empty()) check(file.mesh);
+  for (const PlacedMesh& placed : file.placed) {
+    check(*placed.mesh);  // there is memory for it
+    require(placed.places.size() >= 2 && std::ranges::all_of(placed.places, is_placement));
   }
   for (const MeshLight& light : file.lights) {
     require(is_finite(light.position) && is_unit(light.direction) && is_finite(light.intensity));

@@ -16,6 +16,7 @@ struct FieldName {
 constexpr std::array kFields{
     FieldName{"append", "--append"},
     FieldName{"backdrop", "--backdrop"},
+    FieldName{"one_sided", "--one-sided"},
     FieldName{"bounces", "--bounces"},
     FieldName{"camera", "--camera"},
     FieldName{"check", "--check"},

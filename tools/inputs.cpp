@@ -13,6 +13,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/text/byte_stream.h"
 #include "engine/io/text/text.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/point_input.h"
 #include "format/text.h"
@@ -189,7 +190,7 @@ void SceneArguments::apply(LightingRequest& request, const std::filesystem::path
   } else {
     note_unknown_up(files_->paths(), up_, progress);
   }
-  if (std::ranges::all_of(files_->paths(), holds_points))
+  if (std::ranges::all_of(object_files(files_->paths()), holds_points))
     note_unused(command_->app(), {"--points"}, "no file of the scene is a mesh", progress);
 }
 

@@ -13,7 +13,8 @@
 namespace ptc {
 
 std::vector<std::string> mesh_endings() {
-  return {".obj", ".obj.gz", ".ply", ".ply.gz", ".off", ".off.gz", ".gltf", ".glb", ".stl"};
+  return {".obj",    ".obj.gz", ".ply", ".ply.gz", ".off",
+          ".off.gz", ".gltf",   ".glb", ".stl",    ".scene.json"};
 }
 
 std::vector<std::string> input_endings() {

@@ -58,6 +58,7 @@ void declare(ptc::Command& command, Arguments& arguments) {
   command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
                      "Mesh whose texture is baked; repeatable\n"
                      "By default that is the meshes of SCENE, when it has no container.");
+  ptc::add_one_sided(app, request.one_sided);
   constexpr char kGroup[] = "Texture";
   ptc::add_size(app, request.size, true, "Width and height of the texture, in texels", "1024")
       ->group(kGroup);

@@ -7,6 +7,7 @@
 
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/append.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/scene_record.h"
 #include "format/node_page.h"
 #include "tools/common.h"
@@ -109,6 +110,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
          "The ground lies below the lowest y of the meshes, and the wall stands to the left of "
          "their lowest x. Turn a mesh whose z is up before you build it.")
       ->group(ptc::kFilesGroup);
+  ptc::add_one_sided(app, request.one_sided);
 }
 
 void declare_sampling(CLI::App& app, Arguments& arguments) {
@@ -190,9 +192,10 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
 /// Notes options that are for meshes when no input is a mesh.
 void note_options_of_meshes(const Arguments& arguments, const CLI::App& app,
                             ptc::Progress& progress) {
-  if (!std::ranges::all_of(arguments.request.inputs, ptc::holds_points)) return;
-  std::vector<std::string> options{"--points", "--spacing", "--backdrop", "--pixels-per-surfel",
-                                   "--finest", "--sky-rays"};
+  if (!std::ranges::all_of(ptc::object_files(arguments.request.inputs), ptc::holds_points)) return;
+  std::vector<std::string> options{"--points",    "--spacing",           "--backdrop",
+                                   "--one-sided", "--pixels-per-surfel", "--finest",
+                                   "--sky-rays"};
   // Lamps light clouds, too
   if (!arguments.lights.given()) options.insert(options.end(), {"--sun-rays", "--area-rays"});
   ptc::note_unused(app, options, "no input is a mesh", progress);

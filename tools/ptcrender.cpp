@@ -6,6 +6,7 @@
 
 #include "engine/base/error.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
@@ -71,6 +72,7 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
       .add_flag("--backdrop", request.backdrop,
                 "Set the meshes on a ground before a red wall, as ptcbuild does; +y is up")
       ->group(ptc::kFilesGroup);
+  ptc::add_one_sided(command.app(), request.one_sided);
 }
 
 void declare_picture(CLI::App& app, Arguments& arguments) {
@@ -94,7 +96,7 @@ void declare_lights(CLI::App& app, Arguments& arguments) {
 
 /// Refuses clouds, which would be ignored in silence: the camera would see the surfels instead.
 void refuse_clouds(const std::vector<std::filesystem::path>& meshes) {
-  for (const std::filesystem::path& path : meshes) {
+  for (const std::filesystem::path& path : ptc::object_files(meshes)) {
     if (!ptc::holds_points(path)) continue;
     throw ptc::DataError(path.string() + ": offset 0: this is a cloud; --mesh takes a mesh");
   }

@@ -27,6 +27,7 @@
 
 #include "engine/base/numbers.h"
 #include "engine/io/image/texture.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "tools/common.h"
@@ -106,7 +107,7 @@ using Texts = std::map<std::string, std::string>;
 
 /// Returns the texts of the first cloud that says which axis is up; none where no one does.
 Texts text_with_up(const std::vector<std::filesystem::path>& files) {
-  for (const std::filesystem::path& file : files) {
+  for (const std::filesystem::path& file : object_files(files)) {
     if (!holds_points(file)) continue;
     Texts text = open_point_input(file).info.text;
     if (text.contains(kUpKey)) return text;
@@ -309,9 +310,10 @@ glm::vec3 up_of_files(const std::vector<std::filesystem::path>& files, const std
 void note_unknown_up(const std::vector<std::filesystem::path>& files, const std::string& axis,
                      Progress& progress) {
   if (!axis.empty()) return;
+  const std::vector<std::filesystem::path> all = object_files(files);
   const auto silent = std::ranges::find_if(
-      files, [](const auto& file) { return holds_points(file) && !is_container(file); });
-  if (silent == files.end() || !text_with_up(files).empty()) return;
+      all, [](const auto& file) { return holds_points(file) && !is_container(file); });
+  if (silent == all.end() || !text_with_up(files).empty()) return;
   progress.note(silent->filename().string() +
                 ": the file does not say which axis is up, y is taken; --up z if it is z");
 }
@@ -368,6 +370,17 @@ CLI::Option* add_exposure(CLI::App& app, std::optional<float>& exposure) {
       ->type_name("STOPS")
       ->check(in_range(-64, 64))
       ->default_str("chosen, with a curve");
+}
+
+CLI::Option* add_one_sided(CLI::App& app, bool& one_sided) {
+  return app
+      .add_flag(
+          "--one-sided", one_sided,
+          "Let only the fronts of OBJ, PLY, STL and OFF reflect\n"
+          "These formats do not say whether the back of a triangle reflects, so both sides "
+          "do, except on closed surfaces, inside of which all is dark. Fronts are those whose "
+          "corners are counter-clockwise.")
+      ->group(kFilesGroup);
 }
 
 CLI::Option* add_samples(CLI::App& app, unsigned& samples) {

@@ -87,6 +87,8 @@ CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
                         std::span<const std::string_view> names);
 /// Declares --exposure. @param exposure  stays empty unless it is given
 CLI::Option* add_exposure(CLI::App& app, std::optional<float>& exposure);
+/// Declares --one-sided.
+CLI::Option* add_one_sided(CLI::App& app, bool& one_sided);
 /// Declares --samples, of a pixel or texel.
 CLI::Option* add_samples(CLI::App& app, unsigned& samples);
 /// Declares --size. @param size  width and height, pixels; stays empty unless it is given

@@ -78,8 +78,13 @@ void JsonFields::finish() const {
 }
 
 Json parse_json(const std::string& text, const std::string& where) {
+  constexpr int kMaxDepth = 64;  // of arrays and objects in each other
+  const auto check_depth = [&](int depth, Json::parse_event_t, const Json&) {
+    if (depth > kMaxDepth) throw DataError(where + " is nested more than 64 deep");
+    return true;
+  };
   try {
-    return Json::parse(text);
+    return Json::parse(text, check_depth);
   } catch (const Json::exception& error) {
     throw DataError(where + " is not JSON: " + error.what());
   }

@@ -68,7 +68,7 @@ class JsonFields {
 
 /// Parses JSON text.
 /// @param where  names the text in the message
-/// @throws DataError when `text` is not JSON
+/// @throws DataError when `text` is not JSON, or is nested more than 64 deep
 [[nodiscard]] Json parse_json(const std::string& text, const std::string& where);
 /// Returns JSON as text on one line.
 /// @param where  names the text in the message

@@ -76,7 +76,9 @@ class GuideTest(unittest.TestCase):
         write_inputs(self.here)
 
     def run_page(self, text, **variables):
-        """Runs the commands of a page; returns how many there are."""
+        """Writes the files that a page shows, and runs its commands; returns how many there are."""
+        for name, content in re.findall(r"^```json (\S+)\n(.*?)^```", text, re.M | re.S):
+            (self.here / name).write_text(content)
         environment = dict(os.environ, PATH=f"{BIN}:{os.environ['PATH']}", **variables)
         count, printed = 0, ""
         for line, code in commands(text):

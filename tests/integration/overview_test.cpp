@@ -162,7 +162,8 @@ TEST_CASE("overview: the box before a backdrop is that of the mesh", "[integrati
   for (const bool smooth :
        {false, true}) {  // the backdrop of a mesh with normals has more vertices
     if (smooth) mesh.normals.assign(mesh.positions.size(), {0, 0, 1});
-    const Bounds box = bounds_before_backdrop(load_meshes({}, &mesh, true, {}, silent).mesh);
+    const Bounds box =
+        bounds_before_backdrop(load_meshes({}, &mesh, {.backdrop = true}, {}, silent).mesh);
     CHECK(box.low == bounds.low);
     CHECK(box.high == bounds.high);
   }

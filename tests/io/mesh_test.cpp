@@ -1,13 +1,16 @@
 // Bounding boxes, and joining meshes.
 #include "engine/io/mesh/mesh.h"
 
+#include <filesystem>
 #include <stdexcept>
+#include <vector>
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/spilled_mesh.h"
 #include "tests/io/files.h"
 
 using namespace ptc;
@@ -131,5 +134,45 @@ TEST_CASE("mesh: file names with an unknown ending are refused", "[io][mesh]") {
   for (const char* name : {"a.blend", "a.dae", "a", "a.gltf.gz"}) {
     CHECK_THAT(refusal([&] { static_cast<void>(read_mesh(scratch.file(name, "x"))); }),
                Contains(name) && Contains("nothing that can be read"));
+  }
+}
+
+TEST_CASE("mesh: both sides reflect in formats that know no sides, unless asked otherwise",
+          "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<std::filesystem::path> files{
+      scratch.file("a.obj",
+                   "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl m\nf 1 2 3\n"),
+      scratch.file("a.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                   "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                   "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+      scratch.file("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+      scratch.file("a.stl",
+                   "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"
+                   "vertex 0 1 0\nendloop\nendfacet\nendsolid\n")};
+  scratch.file("a.mtl", "newmtl m\nKd 1 0 0\n");
+  Material blue;
+  blue.name = "blue";
+  blue.albedo = {0, 0, 1};
+  for (const auto& file : files) {
+    INFO(file);
+    for (const bool spill : {false, true}) {
+      const auto materials = [&](MeshRoom room) {
+        room.temp_directory = scratch.path();
+        if (spill) room.memory_bytes = 0;
+        const MeshFile read = read_mesh(file, room);
+        REQUIRE((read.spilled != nullptr) == spill);
+        return spill ? read.spilled->materials() : read.mesh.materials;
+      };
+      for (const Material& material : materials({})) CHECK(material.double_sided);
+      for (const Material& material : materials({.one_sided = true}))
+        CHECK_FALSE(material.double_sided);
+      for (const Material& material : materials({.material = blue})) {
+        CHECK(material.double_sided);
+        CHECK(material.albedo == blue.albedo);
+        CHECK(material.name != "blue");
+      }
+    }
   }
 }

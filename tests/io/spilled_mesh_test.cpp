@@ -130,12 +130,13 @@ TEST_CASE("spilled mesh: PLY, OFF, STL and glTF", "[io][spilled]") {
   scratch.file("a.bin", bytes);
   for (const int mode : {4, 5, 6}) {
     nlohmann::json json = nlohmann::json::parse(R"({
-      "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}, {"mesh": 0, "scale": [-1, 1, 1]}],
+      "asset": {"version": "2.0"}, "nodes": [{"mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}],
       "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
       "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3000, "type": "VEC3"}],
       "bufferViews": [{"buffer": 0, "byteLength": 36000}],
       "buffers": [{"uri": "a.bin", "byteLength": 36000}]})");
     json["meshes"][0]["primitives"][0]["mode"] = mode;
+    json["meshes"].push_back(json["meshes"][0]);
     const auto path = scratch.file("a.gltf", json.dump());
     check_same(path, 1 << 16);
     const std::size_t each = mode == 4 ? kVertices / 3 : kVertices - 2;

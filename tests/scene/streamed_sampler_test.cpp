@@ -20,11 +20,11 @@ namespace {
 
 std::vector<Surfel> stream(const std::vector<Mesh>& meshes, const SamplingOptions& options,
                            std::uint64_t memory_bytes = StreamingRoom::kLeastBytes,
-                           unsigned threads = 2) {
+                           unsigned threads = 2, bool lamps = false) {
   const test::TemporaryDirectory dir;
   MeshParts parts;
-  for (const Mesh& mesh : meshes) parts.add(mesh);
-  const SurfaceSurvey found = survey(parts, 1000);
+  for (const Mesh& mesh : meshes) parts.add(std::make_shared<const Mesh>(mesh));
+  const SurfaceSurvey found = survey(parts, 1000, lamps);
   const ThreadPool executor(threads);
   return drain(*sample_parts(parts, found, options,
                              {.memory_bytes = memory_bytes, .temp_dirs = {dir.path()}}, executor));
@@ -168,6 +168,29 @@ TEST_CASE("streamed sampler: several meshes keep their origins, materials and at
   }
   CHECK(of_red == Approx(4).epsilon(1e-4));
   CHECK(of_lamp == Approx(2).epsilon(1e-4));
+}
+
+TEST_CASE("streamed sampler: a closed mesh has no surfels inside, an open or lit one has",
+          "[scene][streamed]") {
+  Mesh closed = box();
+  closed.materials[0].double_sided = true;
+  Mesh open = closed;
+  open.triangles.pop_back();
+  open.material_of.pop_back();
+  Mesh turned = closed;
+  for (auto& triangle : turned.triangles) std::swap(triangle[1], triangle[2]);
+  Mesh lamp = ground(0.1F);
+  lamp.materials[0].emission = glm::vec3(1);
+  SamplingOptions options;
+  options.count = 3000;
+  const auto area = [&](const std::vector<Mesh>& meshes, bool lamps) {
+    return covered_area(stream(meshes, options, StreamingRoom::kLeastBytes, 2, lamps));
+  };
+  CHECK(area({closed}, false) == Approx(6).epsilon(1e-4));
+  CHECK(area({closed, open}, false) == Approx(6 + 11).epsilon(1e-4));
+  CHECK(area({turned}, false) == Approx(12).epsilon(1e-4));
+  CHECK(area({closed}, true) == Approx(12).epsilon(1e-4));
+  CHECK(area({closed, lamp}, false) == Approx(12 + 0.04).epsilon(1e-4));
 }
 
 TEST_CASE("streamed sampler: patches too small for a surfel keep their area", "[scene][streamed]") {

@@ -418,7 +418,8 @@ GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::siz
   const std::uint64_t stride =
       unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
   const std::uint64_t elements = unsigned_at(accessor, "count").value_or(0);
-  if (expected && elements != *expected) fail(name + " does not have as many elements as POSITION");
+  if (expected && elements != *expected)
+    fail(name + " has another number of elements than the others beside it");
   if (stride < element_bytes) fail(name + " has elements that overlap");
   // This is (elements - 1) * stride + element_bytes > view.length - offset without overflow
   if (elements > 0 && (offset > view.length || element_bytes > view.length - offset ||

@@ -9,7 +9,7 @@
 
 namespace ptc {
 
-const GltfMaterial& GltfMaterials::use(std::optional<std::uint64_t> index) {
+const GltfMaterial& GltfMaterials::use(std::optional<std::uint64_t> index, MeshSoup& soup) {
   const std::uint64_t key = index.value_or(std::numeric_limits<std::uint64_t>::max());
   const auto known = materials_.find(key);
   if (known != materials_.end()) return known->second;
@@ -17,7 +17,7 @@ const GltfMaterial& GltfMaterials::use(std::optional<std::uint64_t> index) {
   Material material;
   material.albedo = glm::vec3(1);
   if (index) read_material(document_.at("materials", *index), material, made);
-  made.index = soup_.add_material(std::move(material));
+  made.index = soup.add_material(std::move(material));
   return made;
 }
 

@@ -31,17 +31,19 @@ struct GltfMaterial {
   TexturePlace place;
 };
 
-/// Reads the materials that a file uses, each once, into a soup.
+/// Reads the materials that a file uses, each once, into the soups that use them.
 class GltfMaterials {
  public:
   /// All must outlive this.
-  GltfMaterials(GltfDocument& document, MeshSoup& soup, TextureLoader& textures,
-                MeshWarnings& warnings)
-      : document_(document), soup_(soup), textures_(textures), warnings_(warnings) {}
+  GltfMaterials(GltfDocument& document, TextureLoader& textures, MeshWarnings& warnings)
+      : document_(document), textures_(textures), warnings_(warnings) {}
 
-  /// Returns a material of the file, or the default one, and adds it to the soup on first use.
+  /// Returns a material of the file, or the default one, and adds it to a soup on its first use
+  /// since that soup began.
   /// @throws DataError, LimitError, std::system_error
-  const GltfMaterial& use(std::optional<std::uint64_t> index);
+  const GltfMaterial& use(std::optional<std::uint64_t> index, MeshSoup& soup);
+  /// Begins another soup, without materials.
+  void begin_soup() { materials_.clear(); }
 
  private:
   using Json = GltfDocument::Json;
@@ -57,7 +59,6 @@ class GltfMaterials {
   std::shared_ptr<const Texture> load_image(std::uint64_t source);
 
   GltfDocument& document_;
-  MeshSoup& soup_;
   TextureLoader& textures_;
   MeshWarnings& warnings_;
   std::map<std::uint64_t, GltfMaterial> materials_;                        ///< by index in the file

@@ -60,15 +60,6 @@ void level_attributes(Mesh& a, Mesh& b) {
   }
 }
 
-bool is_finite(const glm::dmat4& m) {
-  for (int column = 0; column < 4; ++column) {
-    for (int row = 0; row < 4; ++row) {
-      if (!std::isfinite(m[column][row])) return false;
-    }
-  }
-  return true;
-}
-
 glm::dvec3 rounded_centre(const Bounds& bounds) {
   return bounds.empty() ? glm::dvec3(0) : glm::round(bounds.low / 2.0 + bounds.high / 2.0);
 }
@@ -116,6 +107,13 @@ bool Mesh::emits() const {
   return std::ranges::any_of(material_of, [&](std::size_t m) { return emits(materials[m]); });
 }
 
+std::uint64_t bytes_of(const Mesh& mesh) noexcept {
+  constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
+                          kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
+  return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex +
+         mesh.colours.size() * sizeof(glm::vec3);
+}
+
 MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room) {
   const std::string extension = lower_extension(path);
   const std::string unpacked = extension == ".gz" ? lower_extension(path.stem()) : extension;
@@ -134,8 +132,7 @@ MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room) {
 
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, const char* field) {
   // Refuse what cannot be joined.
-  const double determinant = glm::determinant(glm::dmat3(transform));
-  if (!is_finite(transform) || determinant == 0 || !std::isfinite(determinant)) {
+  if (!is_placement(Placement(transform))) {
     throw std::invalid_argument("append_mesh: the transform is not finite and invertible");
   }
   if (mesh.materials.size() + other.materials.size() > kMaxMaterials) {
@@ -173,6 +170,21 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, con
     mesh.material_of.push_back(static_cast<std::uint16_t>(material_base + material));
   }
   mesh.materials.insert(mesh.materials.end(), added.materials.begin(), added.materials.end());
+}
+
+bool is_placement(const Placement& place) {
+  for (int column = 0; column < 4; ++column) {
+    const glm::dvec3 c = place[column];
+    if (!std::isfinite(c.x + c.y + c.z)) return false;
+  }
+  const double determinant = glm::determinant(glm::dmat3(place));
+  return determinant != 0 && std::isfinite(determinant);
+}
+
+void place_mesh(Mesh& mesh, const Placement& place) {
+  const glm::dmat4 transform(place);
+  transform_positions(mesh, transform, rounded_centre(transformed_bounds(mesh, transform)));
+  transform_directions(mesh, transform);
 }
 
 }  // namespace ptc

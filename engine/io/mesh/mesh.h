@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -45,7 +47,7 @@ struct Material {
   std::shared_ptr<const Texture> emission_texture;  ///< as `texture`
   TextureWrap wrap;                                 ///< of `texture`
   TextureWrap emission_wrap;                        ///< of `emission_texture`
-  bool double_sided = false;                        ///< the back reflects as the front does (glTF)
+  bool double_sided = false;                        ///< the back reflects as the front does
 };
 
 /// The maximum number of materials of a mesh.
@@ -72,12 +74,17 @@ struct Mesh {
   [[nodiscard]] bool emits() const;
 };
 
+/// Returns the memory of a mesh, bytes, without textures.
+[[nodiscard]] std::uint64_t bytes_of(const Mesh& mesh) noexcept;
+
 /// A camera that a mesh file defines.
 struct MeshCamera {
   glm::dvec3 position{0};       ///< world coordinates, scene units
   glm::vec3 forward{0, 0, -1};  ///< unit
   glm::vec3 up{0, 1, 0};        ///< unit
   float horizontal_fov = 0.8f;  ///< radians
+  /// Width and height of the picture, pixels; 0 where the file does not say.
+  std::array<unsigned, 2> size{};
 };
 
 /// A light that a mesh file defines: one of glTF's KHR_lights_punctual.
@@ -100,11 +107,29 @@ struct MeshRoom {
   std::filesystem::path temp_directory = ".";
   /// Reads the textures; null: they stay in memory.
   std::shared_ptr<TextureStore> textures;
+  /// Takes the place of all materials of the mesh, which keep their names and sides.
+  std::optional<Material> material;
+  /// Whether only fronts reflect in formats that say nothing of sides: all but glTF.
+  bool one_sided = false;
+};
+
+/// Where a mesh stands: an affine map of its positions to world positions. The first three columns
+/// are the linear part, the last one is the translation.
+using Placement = glm::dmat4x3;
+
+/// A mesh that stands in several places.
+struct PlacedMesh {
+  std::shared_ptr<const Mesh> mesh;            ///< null: `spilled`
+  std::shared_ptr<const SpilledMesh> spilled;  ///< where the mesh takes more memory than it may
+  std::vector<Placement> places;               ///< at least one; each can be inverted
 };
 
 /// The content of a mesh file.
 struct MeshFile {
-  Mesh mesh;  ///< all meshes of the file, with world transforms applied
+  /// All meshes of the file but `placed`, with world transforms applied; may then be empty.
+  Mesh mesh;
+  /// Meshes that stand in many places, where a copy for each would take more memory than it may.
+  std::vector<PlacedMesh> placed;
   /// The mesh in place of `mesh`, where that would take more memory than it may (spilled_mesh.h).
   std::shared_ptr<const SpilledMesh> spilled;
   std::vector<MeshCamera> cameras;  ///< world coordinates
@@ -126,8 +151,9 @@ struct MeshFile {
 /// damaged causes a warning, and the plain colour takes its place. Colours of vertices multiply it:
 /// COLOR_0 of glTF, linear; red, green and blue of PLY and of what follows the coordinates in OBJ,
 /// on the sRGB curve. Vertices without a colour are white, and so is a material that is not given
-/// where there are colours. What a file asks for beyond that (skins, transparency, extensions of
-/// glTF) is left out and told by a warning; morph targets are left out.
+/// where there are colours. Materials of glTF say whether their backs reflect; those of other
+/// formats do on both sides unless `room` says otherwise. What a file asks for beyond that (skins,
+/// transparency, extensions of glTF) is left out and told by a warning; morph targets are left out.
 /// @param room  for the mesh; one that takes more memory than that is left on the disk
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not
 ///         finite; LimitError when the JSON of a glTF does not fit in memory; std::system_error
@@ -144,5 +170,16 @@ struct MeshFile {
 ///         the two have more than 65,536 materials or 2^32 vertices together
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform,
                  const char* field = "inputs");
+
+/// Returns the matrix that transforms normals: the inverse transpose of a transform of positions,
+/// up to a positive factor.
+[[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
+/// Says whether a transform mirrors, that is, whether its determinant is negative.
+[[nodiscard]] bool mirrors(const glm::dmat4& transform);
+
+/// Returns whether a placement is finite and can be inverted.
+[[nodiscard]] bool is_placement(const Placement& place);
+/// Transforms a mesh in its place, as append_mesh() does with a copy. @pre is_placement(place)
+void place_mesh(Mesh& mesh, const Placement& place);
 
 }  // namespace ptc

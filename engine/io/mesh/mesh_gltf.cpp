@@ -7,12 +7,14 @@
 //                          `--> material --> texture --> image
 //
 // GltfDocument follows the arrows and checks each index. GltfMesh walks the nodes of the default
-// scene and appends every primitive to one MeshSoup, in which all vertices have normals and texture
-// coordinates of the same index. Two nodes that show one mesh give it twice, so the number of
-// vertices is bounded in terms of the size of the files.
+// scene and notes where meshes stand. Then it appends every primitive to one MeshSoup, in which all
+// vertices have normals and texture coordinates of the same index: a mesh that stands in two places
+// is there twice. Where that would not fit in memory, such a mesh gets a soup of its own, once, and
+// keeps its places.
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -38,7 +40,8 @@ struct Extension {
   bool understood;  // or else it can be left out with little harm, which is told
 };
 // Pictures in WebP have warnings of their own.
-constexpr std::array<Extension, 14> kExtensions = {{{"KHR_materials_emissive_strength", true},
+constexpr std::array<Extension, 15> kExtensions = {{{"EXT_mesh_gpu_instancing", true},
+                                                    {"KHR_materials_emissive_strength", true},
                                                     {"KHR_materials_pbrSpecularGlossiness", true},
                                                     {"KHR_materials_unlit", true},
                                                     {"KHR_materials_clearcoat", false},
@@ -59,31 +62,206 @@ const Extension* find_extension(std::string_view name) {
 }
 
 constexpr char kLights[] = "KHR_lights_punctual";
+constexpr char kInstancing[] = "EXT_mesh_gpu_instancing";
+
+// Returns the matrix of a translation, a rotation (x, y, z, w) and a scale, applied from the last
+// to the first.
+glm::dmat4 matrix_of(std::span<const double> t, std::span<const double> r,
+                     std::span<const double> s) {
+  glm::dmat4 matrix = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
+  for (int i = 0; i < 3; ++i) matrix[i] *= s[static_cast<std::size_t>(i)];
+  matrix[3] = {t[0], t[1], t[2], 1};
+  return matrix;
+}
 
 class GltfMesh {
  public:
   GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
       : document_(path, room.memory_bytes),
-        soup_(path, {room.memory_bytes - std::min(room.memory_bytes, document_.json_bytes()),
-                     room.temp_directory}),
+        room_(room),
+        soup_(path, room_),
         textures_(path.parent_path(), warnings_, room.textures),
-        materials_(document_, soup_, textures_, warnings_) {}
+        materials_(document_, textures_, warnings_) {
+    room_.memory_bytes -= std::min(room_.memory_bytes, document_.json_bytes());
+    room_.one_sided = true;  // its materials know their sides
+  }
 
   MeshFile read() {
     check_extensions();
     visited_.resize(document_.count("nodes"));
     walk_nodes();
-    if (!has_uvs_) soup_.drop_uvs();
+    std::vector<PlacedMesh> placed;
+    if (!copies_fit()) placed = read_placed();
+    begin_soup();
+    for (const auto& [mesh, place] : uses_) add_mesh(mesh, glm::dmat4(place));
     for (std::size_t i = 0; i < document_.count("skins"); ++i) {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }
     warn_of_extensions();
-    MeshFile file = mesh_file(std::move(soup_), std::move(cameras_), warnings_.lines());
+    MeshFile file;
+    if (placed.empty() || !soup_.polygons.empty()) file = end_soup();
+    if (file.mesh.triangles.empty() && !file.spilled && placed.empty())
+      document_.fail("the mesh has no triangle");
+    file.placed = std::move(placed);
+    file.cameras = std::move(cameras_);
+    file.warnings = warnings_.lines();
     file.lights = std::move(lights_);
     return file;
   }
 
  private:
+  // A mesh, by its index, in one place.
+  struct Use {
+    std::uint64_t mesh;
+    Placement place;
+  };
+
+  // Begins a list of polygons with what is left of the memory.
+  void begin_soup() {
+    soup_ = MeshSoup(document_.path(), room_);
+    materials_.begin_soup();
+    has_uvs_ = false;
+  }
+
+  // Returns the mesh of the polygons so far.
+  MeshFile end_soup() {
+    if (!has_uvs_) soup_.drop_uvs();
+    return mesh_file(std::move(soup_), {}, {}, true);
+  }
+
+  // Counts the vertices and triangles of a mesh.
+  std::pair<std::uint64_t, std::uint64_t> count_mesh(std::uint64_t index) {
+    std::uint64_t vertices = 0, triangles = 0;
+    const auto count = [&](std::optional<std::uint64_t> accessor, std::size_t components) {
+      return accessor ? document_.find_elements(*accessor, components).count : 0;
+    };
+    const auto primitives = document_.at("meshes", index).find("primitives");
+    if (primitives == document_.at("meshes", index).end() || !primitives->is_array())
+      document_.fail("a mesh has no primitives");
+    for (const Json& primitive : *primitives) {
+      if (!primitive.is_object()) document_.fail("a primitive is not an object");
+      const Json* const attributes = GltfDocument::member(primitive, "attributes");
+      const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
+      if (attributes == nullptr || mode < 4) continue;
+      const std::uint64_t of = count(document_.unsigned_at(*attributes, "POSITION"), 3);
+      const auto indices = document_.unsigned_at(primitive, "indices");
+      const std::uint64_t corners = indices ? count(indices, 1) : of;
+      vertices += std::min<std::uint64_t>(of, MeshSoup::kNone);
+      triangles += std::min<std::uint64_t>(mode == 4 ? corners / 3 : corners, MeshSoup::kNone);
+    }
+    return {vertices, triangles};
+  }
+
+  // Says whether a copy of each mesh for each of its places fits in memory, or makes no difference.
+  bool copies_fit() {
+    std::map<std::uint64_t, std::uint64_t> all;  // uses of a mesh, by its index
+    for (const Use& use : uses_) {
+      ++all[use.mesh];
+      if (is_placement(use.place)) ++times_[use.mesh];
+    }
+    std::uint64_t vertices = 0, bytes = 0;
+    bool repeats = false;
+    for (const auto& [mesh, times] : all) {
+      const auto [of_vertices, of_triangles] = count_mesh(mesh);
+      const std::uint64_t of_bytes = MeshSoup::peak_bytes(of_vertices, of_triangles);
+      constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max() / 4;
+      if (of_bytes > kMost / times) return false;
+      vertices = std::min(kMost, vertices + times * of_vertices);
+      bytes = std::min(kMost, bytes + times * of_bytes);
+      repeats |= times > 1;
+    }
+    return !repeats || (bytes <= room_.memory_bytes && vertices <= most_vertices());
+  }
+
+  // Reads the meshes that stand in several places, and takes their uses out of the list. Places
+  // that flatten a mesh stay in it.
+  std::vector<PlacedMesh> read_placed() {
+    constexpr std::size_t kMaxSpilled = 32;  // meshes, with a few files each
+    std::vector<PlacedMesh> placed;
+    std::map<std::uint64_t, std::size_t> index_of;  // in `placed`, of a mesh
+    std::set<std::uint64_t> empty;                  // meshes without a triangle
+    std::size_t spilled = 0;
+    for (const auto& [mesh, times] : times_) {
+      if (times == 1 || spilled == kMaxSpilled) continue;
+      begin_soup();
+      add_mesh(mesh, glm::dmat4(1));
+      MeshFile file = end_soup();
+      if (file.mesh.triangles.empty() && !file.spilled) {
+        empty.insert(mesh);
+        continue;
+      }
+      if (file.spilled) ++spilled;
+      index_of[mesh] = placed.size();
+      PlacedMesh& made = placed.emplace_back();
+      made.places.reserve(times);
+      if (file.spilled) {
+        made.spilled = std::move(file.spilled);
+        continue;
+      }
+      // What is held is taken off four times, as reading takes four times as much
+      room_.memory_bytes -= std::min(room_.memory_bytes, 4 * bytes_of(file.mesh));
+      made.mesh = std::make_shared<const Mesh>(std::move(file.mesh));
+    }
+    std::erase_if(uses_, [&](const Use& use) {
+      if (empty.contains(use.mesh)) return true;
+      const auto at = index_of.find(use.mesh);
+      if (at == index_of.end() || !is_placement(use.place)) return false;
+      placed[at->second].places.push_back(use.place);
+      return true;
+    });
+    return placed;
+  }
+
+  // Notes that a mesh stands in a place.
+  void add_use(std::uint64_t mesh, const glm::dmat4& world) {
+    uses_.push_back({mesh, Placement(world)});
+    constexpr std::size_t kUsesBetweenChecks = 1 << 12;
+    if (uses_.size() % kUsesBetweenChecks == 0) check_uses(uses_.size());
+  }
+
+  // Checks that so many places fit in memory, twice: here and in what comes of it.
+  void check_uses(std::uint64_t count) const {
+    if (count <= room_.memory_bytes / (2 * (sizeof(Use) + sizeof(Placement)))) return;
+    throw LimitError(document_.path().string() + ": its " + std::to_string(count) +
+                     " instances take more memory than there is: raise the cap");
+  }
+
+  // Notes the instances of a node. Source: Khronos, EXT_mesh_gpu_instancing.
+  void add_instances(std::uint64_t mesh, const Json& instancing, const glm::dmat4& world) {
+    const Json* const attributes = GltfDocument::member(instancing, "attributes");
+    if (attributes == nullptr) document_.fail("the instances of a node have no attributes");
+    std::optional<std::uint64_t> count;
+    const auto find = [&](const char* key, std::size_t components) {
+      const auto accessor = document_.unsigned_at(*attributes, key);
+      if (!accessor) return GltfDocument::Elements{};
+      const GltfDocument::Elements found = document_.find_elements(*accessor, components, count);
+      count = found.count;
+      check_uses(uses_.size() + found.count);
+      return found;
+    };
+    const GltfDocument::Elements translations = find("TRANSLATION", 3);
+    const GltfDocument::Elements rotations = find("ROTATION", 4);
+    const GltfDocument::Elements scales = find("SCALE", 3);
+    if (!count) return add_use(mesh, world);
+    struct Parts {
+      std::array<double, 3> t{0, 0, 0};
+      std::array<double, 4> r{0, 0, 0, 1};
+      std::array<double, 3> s{1, 1, 1};
+    };
+    std::vector<Parts> parts(*count);
+    const auto read = [&](const GltfDocument::Elements& from, auto member) {
+      if (from.components == 0) return;
+      std::size_t at = 0;
+      document_.read(from, [&](std::span<const double> numbers) {
+        std::ranges::copy(numbers, (parts[at++].*member).begin());
+      });
+    };
+    read(translations, &Parts::t);
+    read(rotations, &Parts::r);
+    read(scales, &Parts::s);
+    for (const Parts& p : parts) add_use(mesh, world * matrix_of(p.t, p.r, p.s));
+  }
+
   void check_extensions() const {
     for (std::size_t i = 0; i < document_.count("extensionsRequired"); ++i) {
       const Json& required = document_.root()["extensionsRequired"][i];
@@ -137,7 +315,7 @@ class GltfMesh {
     return nodes;
   }
 
-  // Adds the meshes and cameras of all nodes, parents before their children.
+  // Notes the meshes, cameras and lights of all nodes, parents before their children.
   void walk_nodes() {
     std::vector<std::pair<std::uint64_t, glm::dmat4>> open;
     const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent) {
@@ -154,7 +332,13 @@ class GltfMesh {
       }
       visited_[index] = true;
       const glm::dmat4 world = parent * local_transform(node);
-      if (const auto mesh = document_.unsigned_at(node, "mesh")) add_mesh(*mesh, world);
+      if (const auto mesh = document_.unsigned_at(node, "mesh")) {
+        if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
+          add_instances(*mesh, *instancing, world);
+        } else {
+          add_use(*mesh, world);
+        }
+      }
       if (const auto camera = document_.unsigned_at(node, "camera")) add_camera(*camera, world);
       if (const Json* const light = GltfDocument::extension(node, kLights))
         add_light(*light, world);
@@ -172,10 +356,7 @@ class GltfMesh {
     const auto r =
         document_.numbers_at<4>(node, "rotation").value_or(std::array{0.0, 0.0, 0.0, 1.0});
     const auto s = document_.numbers_at<3>(node, "scale").value_or(std::array{1.0, 1.0, 1.0});
-    glm::dmat4 matrix = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
-    for (int i = 0; i < 3; ++i) matrix[i] *= s[static_cast<std::size_t>(i)];
-    matrix[3] = {t[0], t[1], t[2], 1};
-    return matrix;
+    return matrix_of(t, r, s);
   }
 
   void add_mesh(std::uint64_t index, const glm::dmat4& world) {
@@ -200,7 +381,8 @@ class GltfMesh {
     const auto position =
         attributes == nullptr ? std::nullopt : document_.unsigned_at(*attributes, "POSITION");
     if (!position) return;
-    const GltfMaterial& material = materials_.use(document_.unsigned_at(primitive, "material"));
+    const GltfMaterial& material =
+        materials_.use(document_.unsigned_at(primitive, "material"), soup_);
     const std::uint64_t base = soup_.positions.size();
     const std::uint64_t count = add_vertices(*attributes, *position, material, world);
     add_triangles(primitive, mode, base, count, material, mirrors(world));
@@ -222,13 +404,18 @@ class GltfMesh {
     return positions.count;
   }
 
-  // Refuses more vertices or corners than the size of the files justifies, because many nodes may
-  // show one mesh.
+  // Returns the vertices or corners that the size of the files justifies.
+  std::uint64_t most_vertices() const {
+    return (std::uint64_t{1} << 20) + 64 * document_.bytes_read();
+  }
+
+  // Refuses more than that: accessors without bytes may have any number of elements, and many
+  // primitives may share one.
   void check_growth(std::uint64_t more) const {
-    const std::uint64_t most = (std::uint64_t{1} << 20) + 64 * document_.bytes_read();
+    const std::uint64_t most = most_vertices();
     if (more > most || soup_.positions.size() > most - more ||
         more >= MeshSoup::kNone - soup_.positions.size() || soup_.corners.size() > most) {
-      document_.fail("its nodes repeat meshes to more vertices than this program accepts");
+      document_.fail("its meshes repeat vertices to more than this program accepts");
     }
   }
 
@@ -382,7 +569,10 @@ class GltfMesh {
   }
 
   GltfDocument document_;
-  MeshSoup soup_;
+  MeshRoom room_;  // what is left of it
+  MeshSoup soup_;  // of the meshes that are read together
+  std::vector<Use> uses_;
+  std::map<std::uint64_t, std::uint64_t> times_;  // places of a mesh that can be inverted
   std::vector<MeshCamera> cameras_;
   std::vector<MeshLight> lights_;
   MeshWarnings warnings_;
@@ -390,7 +580,7 @@ class GltfMesh {
   GltfMaterials materials_;
   std::set<std::uint64_t> cameras_left_out_;  // indices in the file
   std::vector<bool> visited_;                 // per node
-  bool has_uvs_ = false;                      // some primitive has texture coordinates
+  bool has_uvs_ = false;                      // some primitive in the soup has texture coordinates
 };
 
 }  // namespace

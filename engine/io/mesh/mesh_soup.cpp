@@ -251,6 +251,16 @@ void MeshSoup::check_room() {
 
 void MeshSoup::settle() {
   if (!colours.empty()) colours.grow(positions.size(), glm::vec3(1));
+  if (materials.empty()) materials.emplace_back();
+  for (Material& material : materials) {
+    if (room_.material) {
+      Material other = *room_.material;
+      other.name = std::move(material.name);
+      other.double_sided = material.double_sided;
+      material = std::move(other);
+    }
+    material.double_sided |= !room_.one_sided;
+  }
   check_room();
   if (!spilled()) return;
   positions.end();
@@ -270,24 +280,28 @@ Mesh build_mesh(MeshSoup soup) {
   for (const glm::dvec3& position : soup.positions.items())
     positions.emplace_back(position - mesh.origin);
   Soup made = make_triangles(soup, positions);
-  if (made.triangles.empty()) refuse(soup.path(), "the mesh has no triangle");
   complete_normals(soup, made.triangles, positions);
   complete_uvs(soup, made.triangles);
   share_vertices(soup, made.triangles, positions, mesh);
   mesh.material_of = std::move(made.material_of);
   mesh.materials = std::move(soup.materials);
-  if (mesh.materials.empty()) mesh.materials.emplace_back();
   return mesh;
 }
 
 MeshFile mesh_file(MeshSoup soup, std::vector<MeshCamera> cameras,
-                   std::vector<std::string> warnings) {
+                   std::vector<std::string> warnings, bool may_be_empty) {
+  const std::filesystem::path path = soup.path();
   soup.settle();
   MeshFile file{.cameras = std::move(cameras), .warnings = std::move(warnings)};
   if (soup.spilled()) {
     file.spilled = std::make_shared<const SpilledMesh>(std::move(soup));
   } else {
     file.mesh = build_mesh(std::move(soup));
+  }
+  if (file.spilled ? file.spilled->triangles() == 0 : file.mesh.triangles.empty()) {
+    if (!may_be_empty) refuse(path, "the mesh has no triangle");
+    file.spilled.reset();
+    file.mesh = {};
   }
   return file;
 }

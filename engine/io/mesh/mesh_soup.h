@@ -60,7 +60,7 @@ class MeshSoup {
   Spool<glm::vec3> colours;     ///< as Mesh::colours, in the order of the positions; may be fewer
   Spool<Corner> corners;        ///< corners of all polygons, one polygon after another
   Spool<Polygon> polygons;
-  std::vector<Material> materials;  ///< if empty, a material of default values is used
+  std::vector<Material> materials;  ///< if empty, settle() adds one of default values
 
   /// Returns the name of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
@@ -100,8 +100,15 @@ class MeshSoup {
   /// @param polygon  number of its polygon, for the error
   /// @throws DataError when one of its indices is out of range
   [[nodiscard]] Corner checked(Corner corner, std::uint64_t polygon) const;
-  /// Ends the lists: leaves them in memory or on the disk, as MeshRoom describes.
+  /// Ends the lists: leaves them in memory or on the disk, and completes the materials, as MeshRoom
+  /// describes.
   void settle();
+  /// Returns the memory that build_mesh() takes at its peak for triangles whose vertices have all
+  /// attributes, bytes.
+  [[nodiscard]] static std::uint64_t peak_bytes(std::uint64_t vertices,
+                                                std::uint64_t triangles) noexcept {
+    return vertices * (56 + 40 + 24 + 24) + triangles * (3 * 12 + 94 + 8);
+  }
   /// Returns the memory that build_mesh() takes at its peak, bytes.
   [[nodiscard]] std::uint64_t peak_bytes() const noexcept;
 
@@ -116,14 +123,15 @@ class MeshSoup {
 };
 
 /// Builds the mesh of a soup: triangles over shared vertices, relative to an origin.
-/// @throws DataError when an index is out of range, a position is not finite or too far from the
-///         others, or no triangle is left
+/// @throws DataError when an index is out of range, or a position is not finite or too far from the
+///         others
 /// @pre  the soup is not spilled
 [[nodiscard]] Mesh build_mesh(MeshSoup soup);
 /// Makes the content of a file: a mesh in memory or, of a soup that is spilled, one on the disk.
-/// @throws as build_mesh()
+/// @param may_be_empty  whether there need not be a triangle
+/// @throws as build_mesh(), and DataError when no triangle is left
 [[nodiscard]] MeshFile mesh_file(MeshSoup soup, std::vector<MeshCamera> cameras,
-                                 std::vector<std::string> warnings);
+                                 std::vector<std::string> warnings, bool may_be_empty = false);
 
 /// The work that the triangulation of a polygon took.
 struct TriangulationCounts {
@@ -142,12 +150,6 @@ struct TriangulationCounts {
 TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
                                 std::vector<std::array<std::uint32_t, 3>>& triangles,
                                 std::optional<std::uint64_t> max_looks = {});
-
-/// Returns the matrix that transforms normals: the inverse transpose of a transform of positions,
-/// up to a positive factor.
-[[nodiscard]] glm::dmat3 normal_transform(const glm::dmat4& transform);
-/// Says whether a transform mirrors, that is, whether its determinant is negative.
-[[nodiscard]] bool mirrors(const glm::dmat4& transform);
 
 /// Makes a camera from directions of any length.
 /// @param horizontal_fov  radians

@@ -119,7 +119,6 @@ class TriangleReader {
 }  // namespace
 
 SpilledMesh::SpilledMesh(MeshSoup soup) : soup_(std::make_unique<MeshSoup>(std::move(soup))) {
-  if (soup_->materials.empty()) soup_->materials.emplace_back();
   // Check the positions
   PositionCheck check(soup_->path());
   {
@@ -135,7 +134,6 @@ SpilledMesh::SpilledMesh(MeshSoup soup) : soup_(std::make_unique<MeshSoup>(std::
     for (const glm::vec3& position : triangle.positions)
       bounds_.add(origin_ + glm::dvec3(position));
   });
-  if (triangles_ == 0) throw DataError(soup_->path().string() + ": the mesh has no triangle");
 }
 
 SpilledMesh::~SpilledMesh() = default;

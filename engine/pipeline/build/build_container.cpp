@@ -43,6 +43,7 @@
 #include "engine/pipeline/build/build_record.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
@@ -174,7 +175,9 @@ class Build {
   }
 
   [[nodiscard]] bool has_meshes() const {
-    return request_.mesh || !std::ranges::all_of(request_.inputs, holds_points);
+    return request_.mesh ||
+           !std::ranges::all_of(object_files(request_.inputs, request_.run.memory_bytes),
+                                holds_points);
   }
 
   [[nodiscard]] std::uint64_t scene_points() const {
@@ -333,7 +336,11 @@ class Build {
     }
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
       budget.charge("the meshes", streamed->parts.bytes());
-      charge_textures(budget, streamed->parts.materials());
+      std::vector<Material> materials = streamed->parts.materials();
+      for (const PlacedMesh& placed : streamed->parts.placed())
+        materials.insert(materials.end(), placed.mesh->materials.begin(),
+                         placed.mesh->materials.end());
+      charge_textures(budget, materials);
       const std::uint64_t fixed =
           streaming_bytes(streamed->found, with_spacing(request_.sampling, streamed->found.area));
       room.streaming.memory_bytes =
@@ -345,9 +352,11 @@ class Build {
     // Start the sort, and check that the disks have room. How many surfels a given spacing makes of
     // a mesh is not known beforehand
     const std::uint64_t known = request_.city_points + inputs.clouds.points;
+    const std::uint64_t places = inputs.streamed ? inputs.streamed->found.places() : 0;
     const bool by_spacing = inputs.has_meshes() && request_.sampling.spacing > 0;
     const std::uint64_t expected =
-        by_spacing ? 0 : known + (inputs.has_meshes() ? request_.sampling.count : 0);
+        by_spacing ? 0
+                   : known + (inputs.has_meshes() ? std::max(request_.sampling.count, places) : 0);
     const std::size_t groups = inputs.attributes.groups();
     const AllSortOptions options =
         sort_options(std::move(budget), expected, points.plan.emits, groups);

@@ -65,6 +65,7 @@ struct BuildRequest {
   std::string up;
   bool remove_duplicates = false;  ///< of points at one position keeps the first
   bool backdrop = false;           ///< sets the meshes on a ground in front of a red wall
+  bool one_sided = false;          ///< only fronts reflect in mesh formats that know no sides
   /// Lights of the meshes, and the sky that lights what is shaded later. Empty: those that
   /// files of meshes define, else default_rig() for meshes, but no lights at all when one of them
   /// emits light; cloud_rig() for clouds without radiance alone.

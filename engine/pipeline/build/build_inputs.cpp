@@ -22,7 +22,9 @@
 #include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
+#include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/build/point_marks.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/point_input.h"
@@ -222,7 +224,8 @@ void plan_channels(const BuildRequest& request, const ContainerReader* scene, bo
 }
 
 /// Says which points are lit how, once all inputs are known.
-void plan_light(const BuildRequest& request, const ContainerReader* scene, bool meshes,
+/// @param given  whether the request or a scene file gives the lights
+void plan_light(const BuildRequest& request, const ContainerReader* scene, bool meshes, bool given,
                 BuildInputs& inputs) {
   const Clouds& clouds = inputs.clouds;
   const bool has_clouds = clouds.points > 0, has_scene = scene && scene->superblock().points > 0;
@@ -238,9 +241,7 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
   const bool scene_waits = has_scene && sky_is_gathered(*scene);
   const bool waiting = (has_clouds && clouds.unlit) || scene_waits,
              lit = meshes || clouds.has_lit_container || (has_scene && !scene_waits);
-  const bool lamps =
-      request.lights && !(request.lights->suns.empty() && request.lights->points.empty() &&
-                          request.lights->spots.empty());
+  const bool lamps = given && has_lamps(inputs.lights);
   inputs.relight = (several && baked && !counted) || (several && inputs.emitters && !has_clouds) ||
                    (waiting && lit) || (has_clouds && lamps && !scene);
   inputs.rays_at_emitters = inputs.emitters && request.sampling.lights.area_rays > 0 && !several;
@@ -249,25 +250,35 @@ void plan_light(const BuildRequest& request, const ContainerReader* scene, bool 
 }
 
 /// Reads the picture of the sky that an input recorded, from where it was or next to that input.
-void load_recorded_sky(const BuildRequest& request, BuildInputs& inputs, const MeshLimits& limits) {
+void load_recorded_sky(const SceneObjects& objects, BuildInputs& inputs, const MeshLimits& limits) {
   const auto name = inputs.clouds.named_by.find(kLightsKey);
   if (name == inputs.clouds.named_by.end()) return;
-  const auto of = std::ranges::find_if(request.inputs, [&](const std::filesystem::path& input) {
-    return input.filename().string() == name->second;
+  const auto of = std::ranges::find_if(objects.objects, [&](const SceneObject& object) {
+    return object.file.filename().string() == name->second;
   });
-  if (of == request.inputs.end()) return;
+  if (of == objects.objects.end()) return;
   const auto store = TextureStore::make(limits.textures, limits.temp_directory);
-  static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(*of), *store));
+  static_cast<void>(load_sky_map(inputs.lights.sky, directory_of(of->file), *store));
 }
 
 BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
                        const MeshLimits& limits, Progress& progress) {
   BuildInputs inputs;
-  const bool alone = request.inputs.size() == 1 && !request.mesh && !scene;
-  for (const auto& input : request.inputs) {
-    if (holds_points(input)) inputs.clouds.measure(input, request.selection, from, alone, progress);
-  }
   Progress silent;
+  SceneObjects objects = read_scene_objects(request.inputs, nullptr, limits.reading);
+  const bool alone = objects.objects.size() == 1 && objects.objects[0].places.size() <= 1 &&
+                     !request.mesh && !scene;
+  for (const SceneObject& object : objects.objects) {
+    if (!holds_points(object.file)) continue;
+    bool first = true;
+    const auto measure = [&](const std::optional<Placement>& place) {
+      inputs.clouds.measure(object.file, place, request.selection, from, alone,
+                            std::exchange(first, false) ? progress : silent);
+    };
+    for (const Placement& place : object.places) measure(place);
+    if (object.places.empty()) measure({});
+  }
+  for (SceneObject& object : objects.objects) object.places = {};  // load_meshes() reads them again
   const bool told = from == BoundsFrom::files && request.note_lost_records;
   inputs.clouds.shorten_records(told ? progress : silent);
   if (inputs.clouds.files.size() > 1) inputs.clouds.text.erase(kViewpointKey);
@@ -280,11 +291,16 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
-  LoadedMeshes meshes =
-      load_meshes(request.inputs, request.mesh.get(), request.backdrop, limits, progress);
+  LoadedMeshes meshes = load_meshes(request.inputs, request.mesh.get(),
+                                    {request.backdrop, request.one_sided}, limits, progress);
   plan_channels(request, scene, !meshes.empty(), inputs, progress);
+  const bool given = request.lights || objects.lights;
   if (request.lights) {
     inputs.lights = *request.lights;
+  } else if (objects.lights) {
+    inputs.lights = *objects.lights;
+    const auto store = TextureStore::make(limits.textures, limits.temp_directory);
+    static_cast<void>(load_sky_map(inputs.lights.sky, {}, *store));
   } else if (const std::string& lights = inputs.clouds.text[kLightsKey]; !lights.empty()) {
     inputs.lights = light_rig_from_json(lights);
   } else if (!meshes.lights.empty()) {
@@ -293,21 +309,22 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     inputs.lights = cloud_rig(up_of(inputs.clouds.text));
   }
   if (meshes.parts) {
-    SurfaceSurvey found = survey(*meshes.parts, kSampleKeys);
+    const bool lamps = !inputs.lights.points.empty() || !inputs.lights.spots.empty();
+    SurfaceSurvey found = survey(*meshes.parts, kSampleKeys, lamps);
     inputs.emitters = found.emits;
     inputs.streamed = std::make_unique<StreamedMeshes>(
         StreamedMeshes{std::move(*meshes.parts), std::move(found)});
   } else {
     inputs.emitters = meshes.mesh.emits();
   }
-  plan_light(request, scene, !meshes.empty(), inputs);
+  plan_light(request, scene, !meshes.empty(), given, inputs);
   if (meshes.empty()) {
-    if (inputs.relight && !request.lights) load_recorded_sky(request, inputs, limits);
+    if (inputs.relight && !given) load_recorded_sky(objects, inputs, limits);
     return inputs;
   }
-  if (!request.lights && !inputs.clouds.text[kLightsKey].empty()) {
-    load_recorded_sky(request, inputs, limits);
-  } else if (!request.lights && !inputs.emitters && meshes.lights.empty()) {
+  if (!given && !inputs.clouds.text[kLightsKey].empty()) {
+    load_recorded_sky(objects, inputs, limits);
+  } else if (!given && !inputs.emitters && meshes.lights.empty()) {
     inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
   if (inputs.streamed) {
@@ -316,8 +333,10 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     inputs.rays_at_emitters = false;
     const StreamedMeshes& streamed = *inputs.streamed;
     inputs.bounds.add(streamed.parts.bounds());
-    inputs.sample.insert(inputs.sample.end(), streamed.found.by_area.begin(),
-                         streamed.found.by_area.end());
+    for (const std::vector<glm::dvec3>* places :
+         {&streamed.found.by_area, &streamed.found.placed_by_area}) {
+      inputs.sample.insert(inputs.sample.end(), places->begin(), places->end());
+    }
     return_freed_memory();
     return inputs;
   }
@@ -333,9 +352,9 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
 
 }  // namespace
 
-void Clouds::measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
-                     bool alone, Progress& progress) {
-  PointFile file = open_point_input(path, selection);
+void Clouds::measure(const std::filesystem::path& path, const std::optional<Placement>& place,
+                     const Selection& selection, BoundsFrom from, bool alone, Progress& progress) {
+  PointFile file = open_placed_points(path, selection, place);
   // Note what the file says of all its points, once
   const std::string name = path.filename().string();
   if (from == BoundsFrom::files) {
@@ -350,7 +369,7 @@ void Clouds::measure(const std::filesystem::path& path, const Selection& selecti
   const bool contained = is_container(path);
   has_container |= contained;
   coloured |= file.info.has_albedo;
-  Cloud& cloud = files.emplace_back(Cloud{path});
+  Cloud& cloud = files.emplace_back(Cloud{.path = path, .place = place});
   note_scan(file.info, cloud);
   cloud.channels = std::move(file.info.channels);
   // Take what it says of their place, or read them
@@ -437,8 +456,8 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
   Feeder feeder(inputs.attributes, frame, first, sorter, attributes, executor, progress);
   if (request.city_points > 0) feeder.feed(*make_city(request.city_points));
   for (const Clouds::Cloud& cloud : inputs.clouds.files) {
-    if (feeder.feed(*open_point_input(cloud.path, request.selection).source, cloud) == cloud.points)
-      continue;
+    const PointFile file = open_placed_points(cloud.path, request.selection, cloud.place);
+    if (feeder.feed(*file.source, cloud) == cloud.points) continue;
     throw DataError(cloud.path.string() + ": the file changed while it was read");
   }
   double spacing = 0;
@@ -453,8 +472,14 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
   if (const StreamedMeshes* streamed = inputs.streamed.get()) {
     const SamplingOptions sampling = with_spacing(request.sampling, streamed->found.area);
     spacing = sampling.spacing;
-    feeder.feed(
-        *sample_parts(streamed->parts, streamed->found, sampling, room.streaming, executor));
+    if (streamed->parts.size() > 0) {
+      feeder.feed(
+          *sample_parts(streamed->parts, streamed->found, sampling, room.streaming, executor));
+    }
+    if (!streamed->parts.placed().empty()) {
+      feeder.feed(
+          *sample_placed(streamed->parts, streamed->found, sampling, room.streaming, executor));
+    }
   }
   inputs.streamed.reset();
   return spacing;

@@ -25,6 +25,7 @@
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/scene/sampling/mesh_parts.h"
+#include "engine/scene/sampling/placed_sampler.h"
 #include "engine/scene/sampling/solids.h"
 #include "engine/scene/sampling/streamed_sampler.h"
 #include "engine/sort/external_sort.h"
@@ -46,6 +47,7 @@ class BoundsExceeded : public DataError {
 struct Clouds {
   struct Cloud {
     std::filesystem::path path;
+    std::optional<Placement> place;  ///< none: the points stay where they are
     std::uint64_t points = 0;
     std::vector<Channel> channels;                ///< in the order of its rows
     std::vector<bool> taken;                      ///< as for AttributePlan::add_input()
@@ -75,13 +77,13 @@ struct Clouds {
   std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
   std::string las_records;  ///< all records of the LAS file, once shorten_records() has run
 
-  /// Adds a cloud to the others. Reads it to its end, unless all that is asked stands in front of
-  /// its points.
+  /// Adds a cloud to the others, in a place. Reads it to its end, unless all that is asked stands
+  /// in front of its points.
   /// @param alone  whether all points of the build are of this cloud, whose values need no watch
   /// @throws DataError when the file breaks its format; RequestError, FormatError as
   ///         open_point_input()
-  void measure(const std::filesystem::path& path, const Selection& selection, BoundsFrom from,
-               bool alone, Progress& progress);
+  void measure(const std::filesystem::path& path, const std::optional<Placement>& place,
+               const Selection& selection, BoundsFrom from, bool alone, Progress& progress);
 
   /// Moves the records of a LAS file to `las_records`, and shortens them in `text` to what a
   /// container keeps.

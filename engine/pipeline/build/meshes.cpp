@@ -3,9 +3,15 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include "engine/base/error.h"
 #include "engine/base/surfel.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/scene/ray_scene.h"
 
@@ -52,64 +58,195 @@ void add_backdrop(Mesh& mesh, const Bounds& bounds, const char* field) {
           {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)}, field);
 }
 
+/// Returns a unit direction that is turned with a place.
+glm::vec3 turned(const glm::vec3& direction, const Placement& place) {
+  const glm::dvec3 moved = glm::dmat3(place) * glm::dvec3(direction);
+  const double length = glm::length(moved);
+  return length > 0 ? glm::vec3(moved / length) : direction;
+}
+
+MeshLight placed_at(MeshLight light, const Placement& place) {
+  light.position = place * glm::dvec4(light.position, 1);
+  light.direction = turned(light.direction, place);
+  return light;
+}
+
+MeshCamera placed_at(MeshCamera camera, const Placement& place) {
+  camera.position = place * glm::dvec4(camera.position, 1);
+  camera.forward = turned(camera.forward, place);
+  camera.up = turned(camera.up, place);
+  return camera;
+}
+
+/// Adds the lights or cameras of a file, once for each place of the file.
+template <typename Item>
+void add_in_places(const std::vector<Item>& items, const std::vector<Placement>& places,
+                   std::vector<Item>& all) {
+  if (places.empty()) all.insert(all.end(), items.begin(), items.end());
+  for (std::size_t i = 0; i < places.size() && !items.empty(); ++i) {
+    for (const Item& item : items) all.push_back(placed_at(item, places[i]));
+  }
+}
+
 /// Collects meshes, and joins them when it is known that all fit.
 class Joiner {
  public:
-  Joiner(const MeshLimits& limits, const char* field) : limits_(limits), field_(field) {}
+  Joiner(const MeshLimits& limits, const MeshChoice& choice, const char* field)
+      : limits_(limits), choice_(choice), field_(field) {}
 
   /// Returns the room that is left for another mesh. What reading takes at its peak is four times
   /// the mesh, or more.
-  [[nodiscard]] MeshRoom room() const {
+  [[nodiscard]] MeshRoom room(const SceneObject& object) const {
     const std::uint64_t held = held_ + textures_->bytes();
     const auto left = [&](std::uint64_t cap) { return cap > held ? cap - held : 0; };
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
     const std::uint64_t kept = left(limits_.kept);
-    return {std::min(left(limits_.reading), kept > kMost / 4 ? kMost : 4 * kept),
-            limits_.temp_directory, textures_};
+    return {.memory_bytes = std::min(left(limits_.reading), kept > kMost / 4 ? kMost : 4 * kept),
+            .temp_directory = limits_.temp_directory,
+            .textures = textures_,
+            .material = object.material,
+            .one_sided = choice_.one_sided || object.one_sided};
+  }
+  [[nodiscard]] TextureStore& textures() noexcept { return *textures_; }
+
+  /// Adds a mesh that stands where its positions say.
+  void add(Mesh mesh) { add(std::move(mesh), {}, "the mesh"); }
+  /// Adds the meshes of a file.
+  /// @param places  where they stand; none: where their positions say
+  void add(MeshFile file, const SceneObject& object) {
+    const std::string name = object.file.string();
+    add(std::move(file.mesh), object.places, name);
+    if (file.spilled) add_apart({nullptr, std::move(file.spilled), object.places}, name);
+    for (PlacedMesh& placed : file.placed) {
+      if (!object.places.empty()) placed.places = products(object.places, placed.places, name);
+      add_apart(std::move(placed), name);
+    }
   }
 
-  void add(Mesh mesh) {
-    held_ += bytes_of(mesh);
-    traced_ += traced_bytes(mesh);
-    meshes_.push_back({std::move(mesh), nullptr});
-  }
-  void add(std::shared_ptr<const SpilledMesh> mesh) {
-    spilled_ = true;
-    meshes_.push_back({{}, std::move(mesh)});
-  }
-
-  [[nodiscard]] LoadedMeshes take(bool backdrop) {
+  [[nodiscard]] LoadedMeshes take() {
+    if (apart_ || traced_ > limits_.traced) return take_apart();
     LoadedMeshes loaded;
-    if (spilled_ || traced_ > limits_.traced) {
-      loaded.parts = std::make_unique<MeshParts>();
-      for (auto& [mesh, spilled] : meshes_) {
-        if (spilled) {
-          loaded.parts->add(std::move(spilled));
+    // The first mesh is taken over, so that a single one is never copied
+    for (Entry& entry : entries_) {
+      const std::vector<Placement>& places = entry.placed.places;
+      const std::size_t copies = std::max<std::size_t>(1, places.size());
+      const std::size_t first_material = loaded.mesh.materials.size();
+      for (std::size_t i = 0; i < copies; ++i) {
+        Mesh mesh = i + 1 < copies ? *entry.mesh : std::move(*entry.mesh);
+        if (!places.empty()) place_mesh(mesh, places[i]);
+        if (i > 0) mesh.materials.clear();  // those of the first copy serve
+        if (loaded.mesh.triangles.empty()) {
+          loaded.mesh = std::move(mesh);
         } else {
-          loaded.parts->add(std::move(mesh));
+          append(loaded.mesh, mesh, i > 0 ? first_material : loaded.mesh.materials.size());
         }
       }
-      if (!backdrop) return loaded;
-      Mesh boxes;
-      add_backdrop(boxes, loaded.parts->bounds(), field_);
-      loaded.parts->add(std::move(boxes));
-      return loaded;
+      entry.mesh.reset();
     }
-    // The first mesh is taken over, so that a single one is never copied
-    for (auto& [mesh, spilled] : meshes_) {
-      if (loaded.mesh.triangles.empty()) {
-        loaded.mesh = std::move(mesh);
-      } else {
-        append_mesh(loaded.mesh, std::exchange(mesh, {}), glm::dmat4(1), field_);
-      }
-    }
-    if (meshes_.size() > 1) check_mesh(loaded.mesh, field_);  // they may lie too far apart
-    if (backdrop && !loaded.mesh.triangles.empty())
+    const bool moved = entries_.size() == 1 && !entries_[0].placed.places.empty();
+    if (moved || entries_.size() > 1) check_mesh(loaded.mesh, field_);  // they may be far apart
+    if (choice_.backdrop && !loaded.mesh.triangles.empty())
       add_backdrop(loaded.mesh, loaded.mesh.bounds(), field_);
     return loaded;
   }
 
  private:
+  /// A mesh, and where it stands.
+  struct Entry {
+    std::shared_ptr<Mesh> mesh;  ///< that can be joined with others; null: `placed` has the mesh
+    PlacedMesh placed;
+  };
+
+  void add(Mesh mesh, const std::vector<Placement>& places, const std::string& name) {
+    if (mesh.triangles.empty()) return;
+    check_places(mesh.bounds(), places, name);
+    held_ += bytes_of(mesh) + places.size() * sizeof(Placement);
+    traced_ += std::max<std::size_t>(1, places.size()) * traced_bytes(mesh);
+    entries_.push_back({std::make_shared<Mesh>(std::move(mesh)), {nullptr, nullptr, places}});
+  }
+
+  /// Adds a mesh that cannot be joined with others.
+  void add_apart(PlacedMesh placed, const std::string& name) {
+    check_places(placed.mesh ? placed.mesh->bounds() : placed.spilled->bounds(), placed.places,
+                 name);
+    apart_ = true;
+    held_ += placed.places.size() * sizeof(Placement);
+    if (placed.mesh) held_ += bytes_of(*placed.mesh);
+    entries_.push_back({nullptr, std::move(placed)});
+  }
+
+  /// Checks that a mesh can be traced in all its places.
+  static void check_places(const Bounds& bounds, const std::vector<Placement>& places,
+                           const std::string& name) {
+    constexpr double kMax = 1e18;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const Bounds there = placed_bounds(bounds, places[i]);
+      const glm::dvec3 size = there.high - there.low;
+      if (is_placement(places[i]) && fits_coordinates(there.low) && fits_coordinates(there.high) &&
+          std::max({size.x, size.y, size.z}) <= kMax)
+        continue;
+      throw DataError(name + ": its place " + std::to_string(i) +
+                      " is too far away, or makes it too large or too small");
+    }
+  }
+
+  /// Returns the places of a mesh in a file that stands in several places itself.
+  [[nodiscard]] std::vector<Placement> products(const std::vector<Placement>& outer,
+                                                const std::vector<Placement>& inner,
+                                                const std::string& name) const {
+    const std::uint64_t room = limits_.reading > held_ ? limits_.reading - held_ : 0;
+    if (inner.size() > room / (3 * sizeof(Placement)) / outer.size()) {
+      throw LimitError(
+          fmt::format("{}: its {} places, each in {} places, take more memory than "
+                      "there is: raise the cap",
+                      name, inner.size(), outer.size()));
+    }
+    std::vector<Placement> all;
+    all.reserve(outer.size() * inner.size());
+    for (const Placement& o : outer) {
+      for (const Placement& i : inner) all.emplace_back(glm::dmat4(o) * glm::dmat4(i));
+    }
+    return all;
+  }
+
+  /// Appends a mesh whose materials begin at an index.
+  void append(Mesh& mesh, const Mesh& other, std::size_t first_material) const {
+    const std::size_t begin = mesh.material_of.size(), moved = mesh.materials.size();
+    append_mesh(mesh, other, glm::dmat4(1), field_);
+    if (moved == first_material) return;
+    for (std::size_t i = begin; i < mesh.material_of.size(); ++i)
+      mesh.material_of[i] =
+          static_cast<std::uint16_t>(mesh.material_of[i] - moved + first_material);
+  }
+
+  /// Returns the meshes as parts, in the order of the files.
+  [[nodiscard]] LoadedMeshes take_apart() {
+    LoadedMeshes loaded;
+    loaded.parts = std::make_unique<MeshParts>();
+    for (Entry& entry : entries_) {
+      PlacedMesh& placed = entry.placed;
+      if (entry.mesh) placed.mesh = std::move(entry.mesh);
+      if (placed.mesh && placed.places.size() > 1) {
+        loaded.parts->add(std::move(placed));
+        continue;
+      }
+      const auto add = [&](const std::optional<Placement>& place) {
+        if (placed.mesh) {
+          loaded.parts->add(placed.mesh, place);
+        } else {
+          loaded.parts->add(placed.spilled, place);
+        }
+      };
+      for (const Placement& place : placed.places) add(place);
+      if (placed.places.empty()) add({});
+    }
+    if (!choice_.backdrop) return loaded;
+    Mesh boxes;
+    add_backdrop(boxes, loaded.parts->bounds(), field_);
+    loaded.parts->add(std::make_shared<const Mesh>(std::move(boxes)));
+    return loaded;
+  }
+
   /// Returns the memory of a mesh with what rays at it and its sampling take.
   [[nodiscard]] static std::uint64_t traced_bytes(const Mesh& mesh) {
     constexpr std::uint64_t kRayBytes = 90, kSamplingBytes = 24;  // for each triangle
@@ -118,35 +255,34 @@ class Joiner {
   }
 
   MeshLimits limits_;
+  MeshChoice choice_;
   std::shared_ptr<TextureStore> textures_ =
       TextureStore::make(limits_.textures, limits_.temp_directory);
   const char* field_;
-  std::vector<std::pair<Mesh, std::shared_ptr<const SpilledMesh>>> meshes_;
-  bool spilled_ = false;
+  std::vector<Entry> entries_;           ///< in the order of the files
+  bool apart_ = false;                   ///< there are some that cannot be joined
   std::uint64_t held_ = 0, traced_ = 0;  ///< bytes
 };
 
 }  // namespace
 
 LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
-                         bool backdrop, const MeshLimits& limits, Progress& progress,
+                         const MeshChoice& choice, const MeshLimits& limits, Progress& progress,
                          std::vector<MeshCamera>* cameras, const char* field) {
   // Read the mesh files
-  Joiner joiner(limits, field);
+  Joiner joiner(limits, choice, field);
   std::vector<MeshLight> lights;
-  for (const std::filesystem::path& input : inputs) {
-    if (holds_points(input)) continue;
-    MeshFile file = read_mesh(input, joiner.room());
+  const SceneObjects scene = read_scene_objects(inputs, &joiner.textures(), limits.reading);
+  if (cameras) cameras->insert(cameras->end(), scene.cameras.begin(), scene.cameras.end());
+  for (const SceneObject& object : scene.objects) {
+    if (holds_points(object.file)) continue;
+    MeshFile file = read_mesh(object.file, joiner.room(object));
     for (const std::string& warning : file.warnings) {
-      progress.note(input.string() + ": " + warning);
+      progress.note(object.file.string() + ": " + warning);
     }
-    lights.insert(lights.end(), file.lights.begin(), file.lights.end());
-    if (cameras) cameras->insert(cameras->end(), file.cameras.begin(), file.cameras.end());
-    if (file.spilled) {
-      joiner.add(std::move(file.spilled));
-    } else {
-      joiner.add(std::move(file.mesh));
-    }
+    add_in_places(file.lights, object.places, lights);
+    if (cameras) add_in_places(file.cameras, object.places, *cameras);
+    joiner.add(std::move(file), object);
   }
 
   // Add the mesh in memory and the backdrop
@@ -154,7 +290,7 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
     check_mesh(*also);
     joiner.add(Mesh(*also));
   }
-  LoadedMeshes loaded = joiner.take(backdrop);
+  LoadedMeshes loaded = joiner.take();
   loaded.lights = std::move(lights);
   return loaded;
 }

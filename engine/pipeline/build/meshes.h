@@ -26,6 +26,12 @@ struct MeshLimits {
   std::filesystem::path temp_directory = ".";
 };
 
+/// What is done with the meshes of a request.
+struct MeshChoice {
+  bool backdrop = false;   ///< sets them on a ground in front of a red wall
+  bool one_sided = false;  ///< as for MeshRoom
+};
+
 /// The meshes of a request.
 struct LoadedMeshes {
   Mesh mesh;  ///< all of them, joined; without triangles when there is none, or when `parts` has
@@ -36,19 +42,18 @@ struct LoadedMeshes {
   [[nodiscard]] bool empty() const noexcept { return mesh.triangles.empty() && !parts; }
 };
 
-/// Reads meshes and joins them into one. Clouds among the inputs are skipped. Meshes that take more
-/// memory than they may, to be read and to be traced by rays, are left on the disk.
+/// Reads meshes and those of scene files, and joins them into one. Clouds are skipped. Meshes that
+/// take more memory than they may, to be read and to be traced by rays, are left on the disk.
 /// @param also      a mesh in memory, joined after those of the inputs; null: none
 /// @param limits    of all meshes together
-/// @param backdrop  sets the meshes on a ground in front of a red wall
 /// @param progress  gets the warnings of each file as notes that begin with its name
 /// @param cameras   gets the cameras of the files, in their order; may be null
 /// @param field     the member of the request that names the inputs, for errors
 /// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
 ///         `also` or the joined mesh, or append_mesh() refuses to join them; std::system_error
 [[nodiscard]] LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs,
-                                       const Mesh* also, bool backdrop, const MeshLimits& limits,
-                                       Progress& progress,
+                                       const Mesh* also, const MeshChoice& choice,
+                                       const MeshLimits& limits, Progress& progress,
                                        std::vector<MeshCamera>* cameras = nullptr,
                                        const char* field = "inputs");
 

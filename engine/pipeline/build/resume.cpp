@@ -22,6 +22,7 @@
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/pipeline/build/build_inputs.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "format/checksum.h"
 
 namespace ptc {
@@ -71,6 +72,9 @@ std::string text_of(const BuildRequest& request) {
          fmt::format("{}, {} bytes, changed {}", whole, std::filesystem::file_size(path), changed));
   };
   for (const std::filesystem::path& input : request.inputs) file("an input", input);
+  for (const std::filesystem::path& named :
+       read_scene_objects(request.inputs, nullptr, request.run.memory_bytes).named)
+    file("a file of the scene", named);
   if (!request.append.empty()) file("`append`", request.append);
 
   // Record the settings of the surfels
@@ -81,6 +85,7 @@ std::string text_of(const BuildRequest& request) {
   line("`original_order`", request.original_order);
   line("`remove_duplicates`", request.remove_duplicates);
   line("`backdrop`", request.backdrop);
+  line("`one_sided`", request.one_sided);
   line("the lights", request.lights ? to_json(*request.lights) : "of the scene");
   line("`sampling.count`", sampling.count);
   line("`sampling.spacing`", sampling.spacing);

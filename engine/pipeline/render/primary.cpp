@@ -77,6 +77,21 @@ std::unique_ptr<PrimaryView> view_mesh(const RayScene& scene, const DirectLight&
   return std::make_unique<MeshView>(scene, light, sampling, camera, side, lift);
 }
 
+Camera camera_of(const MeshCamera& from, const std::optional<std::array<unsigned, 2>>& size) {
+  Camera camera;
+  const std::array<unsigned, 2> pixels = size.value_or(from.size);
+  if (pixels[0] > 0 && pixels[1] > 0) {
+    camera.width = pixels[0];
+    camera.height = pixels[1];
+  }
+  const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
+  camera.position = from.position;
+  camera.look_at = from.position + glm::dvec3(from.forward);
+  camera.up = from.up;
+  camera.vertical_fov = 2 * std::atan(std::tan(from.horizontal_fov * 0.5F) / aspect);
+  return camera;
+}
+
 Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> cameras,
                       const std::optional<Bounds>& subject,
                       const std::optional<std::array<unsigned, 2>>& size) {
@@ -84,18 +99,7 @@ Camera default_camera(const ContainerReader& scene, std::span<const MeshCamera> 
   if (const auto recorded = text.find(kCameraKey); recorded != text.end())
     return camera_from_json(recorded->second);
   if (cameras.empty()) return overview(scene, up_of(text), subject, size);
-  Camera camera;
-  if (size) {
-    camera.width = (*size)[0];
-    camera.height = (*size)[1];
-  }
-  const MeshCamera& from = cameras.front();
-  const float aspect = static_cast<float>(camera.width) / static_cast<float>(camera.height);
-  camera.position = from.position;
-  camera.look_at = from.position + glm::dvec3(from.forward);
-  camera.up = from.up;
-  camera.vertical_fov = 2 * std::atan(std::tan(from.horizontal_fov * 0.5F) / aspect);
-  return camera;
+  return camera_of(cameras.front(), size);
 }
 
 }  // namespace ptc

@@ -139,9 +139,13 @@ inline constexpr std::uint64_t kSplatBytes = 24;
                                                         PointSource& surfels, const Camera& camera,
                                                         unsigned side, const Executor& executor);
 
+/// Returns the camera of a mesh or scene file, which keeps its horizontal angle.
+/// @param size  width and height of the picture; empty: those of the file, else the usual ones
+[[nodiscard]] Camera camera_of(const MeshCamera& from,
+                               const std::optional<std::array<unsigned, 2>>& size);
+
 /// Returns the camera of a request that names none: the one recorded in the container or, without a
-/// record, the first one of the mesh files or, without that, that of overview(). A camera of a mesh
-/// file keeps its horizontal angle, whatever the shape of the picture.
+/// record, the first one of the mesh files or, without that, that of overview().
 /// @param subject  box around what is to fill the picture; empty: the whole scene
 /// @param size     width and height of the picture; empty: those of the camera
 [[nodiscard]] Camera default_camera(const ContainerReader& scene,

@@ -15,6 +15,7 @@
 #include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/light/group_scenes.h"
 #include "engine/pipeline/light/group_shadows.h"
@@ -109,7 +110,7 @@ void load_subject(Subject& subject, const RenderRequest& request, const Part& pa
                   Progress& progress) {
   std::vector<MeshCamera> cameras;
   LoadedMeshes meshes =
-      load_meshes(request.meshes, request.mesh.get(), request.backdrop,
+      load_meshes(request.meshes, request.mesh.get(), {request.backdrop, request.one_sided},
                   mesh_limits(request, sky, target), progress, &cameras, "meshes");
   if (meshes.parts) {
     progress.note("the meshes do not fit in memory: the camera sees the surfels");
@@ -475,7 +476,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   Progress silent;
   const bool emits =
       may_emit(scene) ||
-      load_meshes(request.meshes, request.mesh.get(), false,
+      load_meshes(request.meshes, request.mesh.get(), {},
                   mesh_limits(request, rig.sky, targets.front().path), silent, nullptr, "meshes")
           .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
@@ -534,7 +535,7 @@ LightingReport render_tiles(const RenderRequest& request, std::span<const Pictur
                             Progress& progress) {
   Progress silent;
   const std::vector<TextureTile> tiles = texture_tiles(
-      load_meshes(request.meshes, request.mesh.get(), request.backdrop,
+      load_meshes(request.meshes, request.mesh.get(), {request.backdrop, request.one_sided},
                   mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes")
           .mesh);
   return_freed_memory();  // of the meshes, which each tile reads for itself
@@ -564,14 +565,21 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   // there are clouds beside them.
   check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
   const std::vector<std::filesystem::path> files = scene_files(request);
-  const BuiltScene scene(
-      request, {.backdrop = request.backdrop, .lights = request.lights, .note_lost_records = false},
-      targets.front().path, progress);
+  const BuiltScene scene(request,
+                         {.backdrop = request.backdrop,
+                          .one_sided = request.one_sided,
+                          .lights = request.lights,
+                          .note_lost_records = false},
+                         targets.front().path, progress);
   RenderRequest rendering = request;
   rendering.scene = scene.path();
   rendering.joined.clear();
-  if (rendering.meshes.empty() && !rendering.mesh && std::ranges::none_of(files, holds_points))
-    rendering.meshes = files;
+  const SceneObjects objects = read_scene_objects(files, nullptr, request.run.memory_bytes);
+  const bool has_points = std::ranges::any_of(
+      objects.objects, [](const SceneObject& object) { return holds_points(object.file); });
+  if (rendering.meshes.empty() && !rendering.mesh && !has_points) rendering.meshes = files;
+  if (rendering.meshes.empty() && !rendering.camera && !objects.cameras.empty())
+    rendering.camera = camera_of(objects.cameras.front(), request.size);
   LightingReport report = render_container(rendering, targets, progress);
   scene.add_stages(report.seconds);
   return report;

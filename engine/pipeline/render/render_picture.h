@@ -40,7 +40,8 @@ struct RenderRequest : LightingRequest {
   std::vector<std::filesystem::path> meshes;
   /// A mesh in memory, seen together with those of `meshes`; null: none.
   std::shared_ptr<const Mesh> mesh;
-  bool backdrop = false;  ///< sets the meshes on a ground in front of a red wall
+  bool backdrop = false;   ///< sets the meshes on a ground in front of a red wall
+  bool one_sided = false;  ///< only fronts reflect in mesh formats that know no sides
   /// Camera of the picture; empty: the one that the scene was built with or, without that, the
   /// first one of the mesh files or, without that, one that sees everything. A backdrop may then
   /// leave the picture; what stands on it does not.

@@ -24,6 +24,7 @@
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/build/point_marks.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
 #include "engine/pipeline/light/built_scene.h"
@@ -411,7 +412,7 @@ LightingReport shade_container(const ShadeRequest& request, const std::filesyste
   // Build a temporary container of clouds and meshes; points go out in the order in which they came
   const bool in_order = output_format(target).has_value() && request.receivers.empty() &&
                         request.count == 0 &&
-                        std::ranges::all_of(scene_files(request), holds_points);
+                        std::ranges::all_of(object_files(scene_files(request)), holds_points);
   const BuiltScene scene(request,
                          {.original_order = in_order,
                           .profile = in_order ? Profile::exact : Profile::compact,

@@ -1,7 +1,6 @@
 #include "engine/scene/sampling/mesh_parts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <span>
 #include <utility>
@@ -29,73 +28,80 @@ MeshTriangle triangle_of(const Mesh& mesh, std::size_t index) {
   return triangle;
 }
 
-/// Takes places at equal steps of a sum that is not known beforehand: whenever there are twice as
-/// many as wanted, every second one goes, and the step doubles.
-class EvenPlaces {
- public:
-  explicit EvenPlaces(std::size_t wanted) : wanted_(wanted) {}
-
-  /// Goes on by a weight.
-  /// @param place  returns the place of a point that is due; its argument is 0 to 1
-  template <typename Place>
-  void add(double weight, const Place& place) {
-    if (step_ == 0) step_ = weight / static_cast<double>(wanted_);
-    for (due_ += weight; due_ > 0 && step_ > 0; due_ -= step_) {
-      golden_ = std::fmod(golden_ + 0.618033988749895, 1.0);
-      places_.push_back(place(golden_));
-      if (places_.size() < 2 * wanted_) continue;
-      for (std::size_t i = 0; i < wanted_; ++i) places_[i] = places_[2 * i];
-      places_.resize(wanted_);
-      step_ *= 2;
-    }
+/// Returns the box around a mesh in several places: exact unless there are very many vertices, else
+/// that of its box in the places.
+Bounds bounds_in(const Mesh& mesh, std::span<const Placement> places) {
+  constexpr std::size_t kMaxVertices = std::size_t{1} << 27;  // about a second
+  Bounds bounds;
+  if (mesh.positions.size() > kMaxVertices / places.size()) {
+    const Bounds box = mesh.bounds();
+    for (const Placement& place : places) bounds.add(placed_bounds(box, place));
+    return bounds;
   }
-
-  [[nodiscard]] std::vector<glm::dvec3> take() { return std::move(places_); }
-
- private:
-  std::size_t wanted_;
-  std::vector<glm::dvec3> places_;
-  double step_ = 0, due_ = 0;
-  double golden_ = 0;  ///< multiples of the golden ratio spread evenly
-};
+  for (const Placement& place : places) {
+    for (const glm::vec3& p : mesh.positions)
+      bounds.add(glm::dvec3(place * glm::dvec4(mesh.origin + glm::dvec3(p), 1)));
+  }
+  return bounds;
+}
 
 }  // namespace
 
+Bounds placed_bounds(const Bounds& bounds, const Placement& place) {
+  Bounds placed;
+  for (int corner = 0; corner < 8 && !bounds.empty(); ++corner) {
+    placed.add(place * glm::dvec4(corner & 1 ? bounds.high.x : bounds.low.x,
+                                  corner & 2 ? bounds.high.y : bounds.low.y,
+                                  corner & 4 ? bounds.high.z : bounds.low.z, 1));
+  }
+  return placed;
+}
+
 void MeshParts::add(Part part, const glm::dvec3& origin, const Bounds& bounds,
                     const std::vector<Material>& materials) {
+  const bool again =
+      !parts_.empty() && parts_.back().spilled && part.spilled == parts_.back().spilled;
+  if (again) {  // its materials are there
+    part.first_material = parts_.back().first_material;
+    part.material_count = parts_.back().material_count;
+    bounds_.add(bounds);
+    parts_.push_back(std::move(part));
+    return;
+  }
   if (materials_.size() + materials.size() > kMaxMaterials)
     throw RequestError("inputs", "the meshes have more than 65,536 materials together");
-  if (parts_.empty()) origin_ = origin;
+  if (parts_.empty())
+    origin_ = part.place ? glm::round(*part.place * glm::dvec4(origin, 1)) : origin;
   bounds_.add(bounds);
   part.first_material = static_cast<std::uint32_t>(materials_.size());
+  part.material_count = static_cast<std::uint32_t>(materials.size());
   materials_.insert(materials_.end(), materials.begin(), materials.end());
   parts_.push_back(std::move(part));
 }
 
-void MeshParts::add(Mesh mesh) {
-  if (mesh.triangles.empty()) return;
-  has_normals_ |= !mesh.normals.empty();
-  has_uvs_ |= !mesh.uvs.empty();
-  has_colours_ |= !mesh.colours.empty();
-  const glm::dvec3 origin = mesh.origin;
-  const Bounds bounds = mesh.bounds();
-  const std::vector<Material> materials = mesh.materials;
-  add({.mesh = std::move(mesh)}, origin, bounds, materials);
+void MeshParts::add(std::shared_ptr<const Mesh> mesh, const std::optional<Placement>& place) {
+  if (mesh->triangles.empty()) return;
+  has_normals_ |= !mesh->normals.empty();
+  has_uvs_ |= !mesh->uvs.empty();
+  has_colours_ |= !mesh->colours.empty();
+  const Mesh& of = *mesh;
+  const Bounds bounds = place ? bounds_in(of, {&*place, 1}) : of.bounds();
+  add({.mesh = std::move(mesh), .place = place}, of.origin, bounds, of.materials);
 }
 
-void MeshParts::add(std::shared_ptr<const SpilledMesh> mesh) {
+void MeshParts::add(std::shared_ptr<const SpilledMesh> mesh,
+                    const std::optional<Placement>& place) {
   has_normals_ |= mesh->has_normals();
   has_uvs_ |= mesh->has_uvs();
   has_colours_ |= mesh->has_colours();
   const SpilledMesh& of = *mesh;
-  add({.spilled = std::move(mesh)}, of.origin(), of.bounds(), of.materials());
+  const Bounds bounds = place ? placed_bounds(of.bounds(), *place) : of.bounds();
+  add({.spilled = std::move(mesh), .place = place}, of.origin(), bounds, of.materials());
 }
 
-std::uint64_t bytes_of(const Mesh& mesh) noexcept {
-  constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
-                          kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
-  return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex +
-         mesh.colours.size() * sizeof(glm::vec3);
+void MeshParts::add(PlacedMesh mesh) {
+  bounds_.add(bounds_in(*mesh.mesh, mesh.places));
+  placed_.push_back(std::move(mesh));
 }
 
 std::uint64_t texture_bytes(const std::vector<Material>& materials) {
@@ -114,66 +120,73 @@ std::uint64_t texture_bytes(const std::vector<Material>& materials) {
 
 std::uint64_t MeshParts::bytes() const noexcept {
   std::uint64_t bytes = 0;
-  for (const Part& part : parts_) bytes += bytes_of(part.mesh);
+  std::set<const Mesh*> meshes{nullptr};
+  const auto add = [&](const Mesh* mesh) {
+    if (meshes.insert(mesh).second) bytes += bytes_of(*mesh);
+  };
+  for (const Part& part : parts_) add(part.mesh.get());
+  for (const PlacedMesh& placed : placed_) {
+    add(placed.mesh.get());
+    bytes += placed.places.size() * sizeof(Placement);
+  }
   return bytes;
 }
 
 void MeshParts::visit(const SpilledMesh::Visit& visit) const {
+  for (std::size_t i = 0; i < parts_.size(); ++i) this->visit(i, visit);
+}
+
+void MeshParts::visit(std::size_t part, const SpilledMesh::Visit& visit) const {
+  const Part& of = parts_[part];
+  const glm::dvec3 from = of.spilled ? of.spilled->origin() : of.mesh->origin;
+  const bool moves = of.place || from != origin_;
+  const Placement place = of.place.value_or(Placement(1));
+  const glm::dmat3 turn = normal_transform(glm::dmat4(place));
+  const bool mirrored = of.place && mirrors(glm::dmat4(place));
+  // Puts a triangle in its place, relative to the common origin, and gives it normals and a
+  // material
+  const auto complete = [&](MeshTriangle& triangle) {
+    triangle.material += of.first_material;
+    const bool flat = has_normals_ && triangle.normals[0] == glm::vec3(0);
+    if (moves) {
+      for (glm::vec3& p : triangle.positions)
+        p = glm::vec3(place * glm::dvec4(from + glm::dvec3(p), 1) - origin_);
+    }
+    if (mirrored) {
+      std::swap(triangle.positions[1], triangle.positions[2]);
+      std::swap(triangle.normals[1], triangle.normals[2]);
+      std::swap(triangle.uvs[1], triangle.uvs[2]);
+      std::swap(triangle.colours[1], triangle.colours[2]);
+    }
+    if (flat) {
+      const auto& [a, b, c] = triangle.positions;
+      triangle.normals.fill(flat_normal(a, b, c));
+    } else if (of.place && has_normals_) {
+      for (glm::vec3& normal : triangle.normals)
+        normal = unit_or_missing(glm::vec3(turn * glm::dvec3(normal)));
+    }
+  };
   std::vector<MeshTriangle> block;
-  for (const Part& part : parts_) {
-    const glm::dvec3 shift = (part.spilled ? part.spilled->origin() : part.mesh.origin) - origin_;
-    // Moves triangles to the common origin and gives them normals and materials
-    const auto complete = [&](MeshTriangle& triangle) {
-      triangle.material += part.first_material;
-      const bool flat = has_normals_ && triangle.normals[0] == glm::vec3(0);
-      if (flat) {
-        const auto& [a, b, c] = triangle.positions;
-        triangle.normals.fill(flat_normal(a, b, c));
-      }
-      if (shift == glm::dvec3(0)) return;
-      for (glm::vec3& position : triangle.positions)
-        position = glm::vec3(glm::dvec3(position) + shift);
-    };
-    if (part.spilled) {
-      part.spilled->visit([&](std::span<const MeshTriangle> some) {
-        block.assign(some.begin(), some.end());
-        for (MeshTriangle& triangle : block) complete(triangle);
-        visit(block);
-      });
-      continue;
-    }
-    for (std::size_t first = 0; first < part.mesh.triangles.size(); first += kBlock) {
-      block.clear();
-      for (std::size_t i = first; i < std::min(part.mesh.triangles.size(), first + kBlock); ++i)
-        complete(block.emplace_back(triangle_of(part.mesh, i)));
+  if (of.spilled) {
+    of.spilled->visit([&](std::span<const MeshTriangle> some) {
+      block.assign(some.begin(), some.end());
+      for (MeshTriangle& triangle : block) complete(triangle);
       visit(block);
-    }
+    });
+    return;
+  }
+  for (std::size_t first = 0; first < of.mesh->triangles.size(); first += kBlock) {
+    block.clear();
+    for (std::size_t i = first; i < std::min(of.mesh->triangles.size(), first + kBlock); ++i)
+      complete(block.emplace_back(triangle_of(*of.mesh, i)));
+    visit(block);
   }
 }
 
-SurfaceSurvey survey(const MeshParts& parts, std::size_t places) {
-  SurfaceSurvey found;
-  EvenPlaces by_area(places), by_count(places);
-  parts.visit([&](std::span<const MeshTriangle> triangles) {
-    found.triangles += triangles.size();
-    for (const MeshTriangle& triangle : triangles) {
-      const Material& material = parts.materials()[triangle.material];
-      found.emits |= material.emission != glm::vec3(0);
-      const glm::dvec3 a(triangle.positions[0]);
-      const glm::dvec3 ab = glm::dvec3(triangle.positions[1]) - a,
-                       ac = glm::dvec3(triangle.positions[2]) - a;
-      const double area = 0.5 * glm::length(glm::cross(ab, ac));
-      found.area += area * (material.double_sided ? 2 : 1);
-      const auto place = [&](double golden) {
-        return parts.origin() + a + std::sqrt(golden) * 0.5 * (ab + ac);
-      };
-      by_area.add(area, place);
-      by_count.add(1, place);
-    }
-  });
-  found.by_area = by_area.take();
-  found.by_count = by_count.take();
-  return found;
+void MeshParts::close(std::size_t part) {
+  const Part& of = parts_[part];
+  for (std::uint32_t i = 0; i < of.material_count; ++i)
+    materials_[of.first_material + i].double_sided = false;
 }
 
 }  // namespace ptc

@@ -15,6 +15,7 @@
 #include "engine/scene/sampling/mesh_parts.h"
 #include "engine/scene/sampling/spacing_field.h"
 #include "engine/scene/sampling/surface_patches.h"
+#include "engine/scene/sampling/surface_survey.h"
 
 namespace ptc {
 

@@ -57,7 +57,9 @@ std::unique_ptr<PointSource> sample_parts(const MeshParts& parts, const SurfaceS
 std::uint64_t streaming_bytes(const SurfaceSurvey& found, const SamplingOptions& options) noexcept {
   const double square = options.spacing * options.spacing;
   const auto surfels = static_cast<std::uint64_t>(square > 0 ? found.area / square : 0);
-  return PieceFile::index_bytes(found.triangles, surfels, kPatchSurfels);
+  constexpr std::uint64_t kPlaceBytes = 192;  // of a place in its group and its turn
+  return PieceFile::index_bytes(found.triangles, surfels, kPatchSurfels) +
+         kPlaceBytes * found.places();
 }
 
 }  // namespace ptc

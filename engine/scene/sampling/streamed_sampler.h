@@ -11,6 +11,7 @@
 #include "engine/scene/sampling/mesh_parts.h"
 #include "engine/scene/sampling/piece_file.h"
 #include "engine/scene/sampling/sampler.h"
+#include "engine/scene/sampling/surface_survey.h"
 
 namespace ptc {
 
@@ -22,8 +23,8 @@ struct StreamingRoom {
   std::vector<std::filesystem::path> temp_dirs{"."};  ///< at least one
 };
 
-/// Makes a stream of surfels as sample_mesh() does, but without light: they reflect nothing yet,
-/// and none counts as buried.
+/// Makes a stream of surfels of the meshes that stand in one place, as sample_mesh() does, but
+/// without light: they reflect nothing yet, and none counts as buried.
 ///
 /// Patches are smaller than those of sample_mesh(), so that the surfels are others, though as many
 /// and as even. They do not depend on the memory, the threads or the directories.
@@ -38,7 +39,8 @@ struct StreamingRoom {
                                                         const StreamingRoom& room,
                                                         const Executor& executor);
 
-/// Returns the bytes that this takes in addition to MeshParts::bytes() and the room.
+/// Returns the bytes that this and sample_placed() take in addition to MeshParts::bytes() and the
+/// room.
 /// @param options  with_spacing()
 [[nodiscard]] std::uint64_t streaming_bytes(const SurfaceSurvey& found,
                                             const SamplingOptions& options) noexcept;

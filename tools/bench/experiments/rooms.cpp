@@ -116,7 +116,9 @@ BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
   if (from_file) {
     if (options.lights) request.lights = options.lights;
     Progress silent;  // the build reads the files again and reports what it leaves out
-    room.mesh = load_meshes(request.inputs, nullptr, choice.backdrop, {}, silent, &cameras).mesh;
+    room.mesh =
+        load_meshes(request.inputs, nullptr, {.backdrop = choice.backdrop}, {}, silent, &cameras)
+            .mesh;
   } else {
     room.mesh = choice.name == "city" ? city_mesh(options.points) : lit.mesh;
   }

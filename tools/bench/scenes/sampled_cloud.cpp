@@ -149,7 +149,7 @@ Mesh mesh_of(const SceneChoice& choice, std::uint64_t points, const RunOptions& 
     return request_scene(choice, {.points = points / kPerTriangle}, run).lit.mesh;
   }
   Progress silent;
-  return load_meshes({choice.file}, nullptr, choice.backdrop, {}, silent).mesh;
+  return load_meshes({choice.file}, nullptr, {.backdrop = choice.backdrop}, {}, silent).mesh;
 }
 
 }  // namespace ptc::bench

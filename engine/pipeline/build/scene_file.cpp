@@ -1,0 +1,364 @@
+// Reads scene files. Where a member is wrong the error names it: "town.scene.json: objects[2]:
+// placements[7]: scale must lie in ...".
+#include "engine/pipeline/build/scene_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/trigonometric.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/io/text/byte_stream.h"
+#include "engine/io/text/text.h"
+#include "engine/scene/camera.h"
+#include "engine/scene/json_fields.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;  // long lists of places have own files
+constexpr std::uint64_t kJsonBytes = 25;  // memory of JSON for each byte of text
+constexpr std::uint64_t kCopies = 3;  // of places: those that are read, and what becomes of them
+constexpr double kMax = std::numeric_limits<float>::max();
+constexpr Range kFinite{-kMax, kMax};
+constexpr Range kPlace{-1e150, 1e150};
+
+/// Returns the place of a translation, a rotation and a scale, applied from the last to the first.
+Placement placement_of(const glm::dvec3& translate, const glm::dquat& rotate,
+                       const glm::dvec3& scale) {
+  const glm::dmat3 turn = glm::mat3_cast(rotate);
+  return {turn[0] * scale.x, turn[1] * scale.y, turn[2] * scale.z, translate};
+}
+
+/// Returns the place of 12 or 16 numbers, row after row.
+Placement placement_of(const std::vector<double>& rows) {
+  Placement place;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column)
+      place[column][row] = rows[static_cast<std::size_t>(4 * row + column)];
+  }
+  return place;
+}
+
+/// Says whether a matrix has no last row, or 0 0 0 1 there.
+bool ends_as_affine(const std::vector<double>& rows) {
+  return rows.size() == 12 ||
+         std::equal(rows.begin() + 12, rows.end(), std::array{0.0, 0.0, 0.0, 1.0}.begin());
+}
+
+/// Checks that places fit in memory.
+/// @param where  names what gives them
+void check_places(std::uint64_t places, std::uint64_t memory_bytes, const std::string& where) {
+  if (places <= memory_bytes / (kCopies * sizeof(Placement))) return;
+  throw LimitError(fmt::format("{}: {} places or more take {} MiB of memory, more than there is",
+                               where, places, (kCopies * sizeof(Placement) * places >> 20) + 1));
+}
+
+/// Reads a file of places: a line for each, with 3, 8, 12 or 16 numbers.
+/// @param before  places that there are already
+std::vector<Placement> read_places(const std::filesystem::path& path, std::uint64_t before,
+                                   std::uint64_t memory_bytes) {
+  std::vector<Placement> places;
+  ByteStream stream(path);
+  std::string_view line;
+  std::vector<double> n;
+  while (stream.next_line(line)) {
+    n.clear();
+    Words words(line.substr(0, line.find('#')));
+    for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+      const auto number = parse_number(word);
+      if (!number || !std::isfinite(*number) || n.size() == 16)
+        stream.fail_at_line("a place has 3, 8, 12 or 16 numbers, and nothing else");
+      n.push_back(*number);
+    }
+    if (n.empty()) continue;
+    Placement place(1);
+    if (n.size() == 3 || n.size() == 8) place[3] = {n[0], n[1], n[2]};
+    if (n.size() == 8) {
+      const glm::dquat turn(n[6], n[3], n[4], n[5]);
+      if (!(glm::length(turn) > 0)) stream.fail_at_line("the rotation of the place is zero");
+      place = placement_of(place[3], glm::normalize(turn), glm::dvec3(n[7]));
+    } else if (n.size() == 12 || n.size() == 16) {
+      if (!ends_as_affine(n)) stream.fail_at_line("the last row of the matrix is not 0 0 0 1");
+      place = placement_of(n);
+    } else if (n.size() != 3) {
+      stream.fail_at_line("a place has 3, 8, 12 or 16 numbers, and nothing else");
+    }
+    if (!is_placement(place)) stream.fail_at_line("the place cannot be inverted");
+    places.push_back(place);
+    if (places.size() % 4096 == 0)
+      check_places(before + places.size(), memory_bytes, path.string());
+  }
+  if (places.empty()) throw DataError(path.string() + ": the file holds no place");
+  return places;
+}
+
+/// Reads one scene file.
+class SceneReader {
+ public:
+  SceneReader(const std::filesystem::path& path, TextureStore* textures, std::uint64_t memory_bytes,
+              SceneObjects& scene)
+      : path_(path), textures_(textures), memory_bytes_(memory_bytes), scene_(scene) {}
+
+  void read() {
+    const InputFile file(path_);
+    if (file.size() > kMaxBytes)
+      throw DataError(path_.string() +
+                      ": a scene file has 16 MiB at most: long lists of places "
+                      "may stand in files of their own");
+    if (file.size() * kJsonBytes > memory_bytes_)
+      throw LimitError(fmt::format("{}: its JSON may take {} MiB of memory, more than there is",
+                                   path_.string(), (file.size() * kJsonBytes >> 20) + 1));
+    std::string text(file.size(), '\0');
+    file.read_at(0, std::as_writable_bytes(std::span(text)));
+    const Json json = parse_json(text, path_.string());
+    JsonFields fields(json, path_.string());
+    unsigned version = 0;
+    fields.read("ptcx_scene", version, {1, 1});
+    if (version != 1) fields.fail("\"ptcx_scene\": 1 is missing, which makes it a scene file");
+    read_materials(fields);
+    if (const Json* const lights = fields.find("lights")) read_lights(*lights);
+    if (const Json* const camera = fields.find("camera")) read_camera(*camera);
+    for_each(fields, "objects",
+             [&](const Json& object, const std::string& where) { read_object(object, where); });
+    fields.finish();
+  }
+
+ private:
+  /// Calls read(element, name for messages) for each element of an array.
+  template <typename Read>
+  void for_each(JsonFields& fields, const char* name, const Read& read) const {
+    const Json* const list = fields.find(name);
+    if (list == nullptr) return;
+    if (!list->is_array()) fields.fail(std::string(name) + " must be an array");
+    for (std::size_t i = 0; i < list->size(); ++i)
+      read((*list)[i], fmt::format("{}: {}[{}]", path_.string(), name, i));
+  }
+
+  /// Returns the path of a file that the scene file names.
+  /// @throws DataError when there is no such file
+  [[nodiscard]] std::filesystem::path resolved(const std::string& name, const JsonFields& fields) {
+    const std::filesystem::path path = path_.parent_path() / name;
+    std::error_code absent;
+    if (!std::filesystem::exists(path, absent)) fields.fail("there is no file " + path.string());
+    return scene_.named.emplace_back(path);
+  }
+
+  /// Calls a function whose errors do not know the file.
+  template <typename Function>
+  auto within(const Function& function) const {
+    try {
+      return function();
+    } catch (const DataError& error) {
+      throw DataError(path_.string() + ": " + error.what());
+    }
+  }
+
+  void read_materials(JsonFields& fields) {
+    const Json* const materials = fields.find("materials");
+    if (materials == nullptr) return;
+    if (!materials->is_object()) fields.fail("materials must be an object");
+    for (const auto& [name, json] : materials->items()) {
+      JsonFields of(json, path_.string() + ": materials: " + name);
+      Material material{.name = name};
+      of.read("albedo", material.albedo, {0, 1});
+      of.read("emission", material.emission, {0, kMax});
+      std::string texture, emission_texture;
+      of.read("albedo_texture", texture);
+      of.read("emission_texture", emission_texture);
+      of.finish();
+      if (!texture.empty()) {
+        if (json.find("albedo") == json.end()) material.albedo = glm::vec3(1);
+        material.texture = load(texture, of);
+      }
+      if (!emission_texture.empty()) {
+        if (json.find("emission") == json.end()) material.emission = glm::vec3(1);
+        material.emission_texture = load(emission_texture, of);
+      }
+      materials_.emplace(name, std::move(material));
+    }
+  }
+
+  [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name,
+                                                    const JsonFields& fields) {
+    const std::filesystem::path path = resolved(name, fields);
+    return textures_ == nullptr ? nullptr : std::make_shared<const Texture>(textures_->read(path));
+  }
+
+  void read_lights(const Json& json) {
+    if (scene_.lights) return;
+    LightRig rig = within([&] { return light_rig_from_json(json.dump()); });
+    if (!rig.sky.map_path.empty()) {
+      const JsonFields fields(json, path_.string() + ": lights: sky");
+      rig.sky.map_path =
+          std::filesystem::absolute(resolved(rig.sky.map_path, fields)).lexically_normal();
+    }
+    scene_.lights = std::move(rig);
+  }
+
+  void read_camera(const Json& json) {
+    const Camera camera = within([&] { return camera_from_json(json.dump()); });
+    const CameraAxes axes = axes_of(camera);
+    const double aspect = static_cast<double>(camera.width) / camera.height;
+    scene_.cameras.push_back(
+        {.position = camera.position,
+         .forward = glm::vec3(axes.forward),
+         .up = glm::vec3(axes.up),
+         .horizontal_fov = static_cast<float>(
+             2 * std::atan(std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * aspect)),
+         .size = {camera.width, camera.height}});
+  }
+
+  void read_object(const Json& json, const std::string& where) {
+    JsonFields fields(json, where);
+    SceneObject object;
+    std::string file, material;
+    fields.read("file", file);
+    if (file.empty()) fields.fail("file is missing");
+    object.file = resolved(file, fields);
+    if (is_scene_file(object.file)) fields.fail("a scene file cannot hold another one");
+    fields.read("material", material);
+    if (!material.empty()) {
+      const auto found = materials_.find(material);
+      if (found == materials_.end()) fields.fail("there is no material \"" + material + "\"");
+      object.material = found->second;
+    }
+    if (const Json* const sided = fields.find("one_sided")) {
+      if (!sided->is_boolean()) fields.fail("one_sided must be true or false");
+      object.one_sided = sided->get<bool>();
+    }
+    const Json* const placements = fields.find("placements");
+    if (placements == nullptr) {
+      if (const auto place = read_place(fields)) object.places.push_back(*place);
+    } else if (placements->is_string()) {
+      object.places =
+          read_places(resolved(placements->get<std::string>(), fields), places_, memory_bytes_);
+    } else if (!placements->is_array() || placements->empty()) {
+      fields.fail("placements must be an array of places, or the name of a file");
+    } else {
+      check_places(places_ + placements->size(), memory_bytes_, where);
+      object.places.reserve(placements->size());
+      for (std::size_t i = 0; i < placements->size(); ++i) {
+        JsonFields of((*placements)[i], fmt::format("{}: placements[{}]", where, i));
+        object.places.push_back(read_place(of).value_or(Placement(1)));
+        of.finish();
+      }
+    }
+    fields.finish();
+    places_ += object.places.size();
+    scene_.objects.push_back(std::move(object));
+  }
+
+  /// Reads a place; nothing where no member gives one.
+  [[nodiscard]] static std::optional<Placement> read_place(JsonFields& fields) {
+    const Json* const matrix = fields.find("matrix");
+    const Json* const rotate = fields.find("rotate");
+    const Json* const scale = fields.find("scale");
+    const bool moves = fields.find("translate") != nullptr || rotate != nullptr || scale != nullptr;
+    if (matrix == nullptr && !moves) return {};
+    if (matrix != nullptr && moves) fields.fail("matrix excludes translate, rotate and scale");
+    Placement place(1);
+    if (matrix != nullptr) {
+      const std::vector<double> rows = numbers(fields, *matrix, "matrix", {12, 16});
+      if (!ends_as_affine(rows)) fields.fail("the last row of matrix must be 0, 0, 0, 1");
+      place = placement_of(rows);
+    } else {
+      glm::dvec3 translate(0), size(1);
+      fields.read("translate", translate, kPlace);
+      glm::dquat turn(1, 0, 0, 0);
+      if (rotate != nullptr) {
+        const std::vector<double> n = numbers(fields, *rotate, "rotate", {4});
+        const glm::dvec3 axis(n[0], n[1], n[2]);
+        const double length = glm::length(axis);
+        if (!(length > 0)) fields.fail("the axis of rotate must not be zero");
+        turn = glm::angleAxis(glm::radians(n[3]), axis / length);
+      }
+      if (scale != nullptr && scale->is_number()) {
+        size = glm::dvec3(scale->get<double>());
+      } else if (scale != nullptr) {
+        if (!scale->is_array()) fields.fail("scale must be a number or an array of three numbers");
+        fields.read("scale", size, kFinite);
+      }
+      place = placement_of(translate, turn, size);
+    }
+    if (!is_placement(place)) fields.fail("the place cannot be inverted");
+    return place;
+  }
+
+  [[nodiscard]] static std::vector<double> numbers(const JsonFields& fields, const Json& json,
+                                                   const char* name,
+                                                   std::initializer_list<std::size_t> counts) {
+    const bool fits = json.is_array() && std::ranges::find(counts, json.size()) != counts.end() &&
+                      std::ranges::all_of(json, [](const Json& n) { return n.is_number(); });
+    if (!fits) {
+      fields.fail(fmt::format(
+          "{} must be an array of {}{} numbers", name, *counts.begin(),
+          counts.size() == 2 ? fmt::format(" or {}", *(counts.begin() + 1)) : std::string()));
+    }
+    return json.get<std::vector<double>>();
+  }
+
+  const std::filesystem::path& path_;
+  TextureStore* textures_;
+  std::uint64_t memory_bytes_;
+  SceneObjects& scene_;
+  std::uint64_t places_ = 0;  ///< of all objects so far
+  std::map<std::string, Material> materials_;
+};
+
+}  // namespace
+
+bool is_scene_file(const std::filesystem::path& path) {
+  return lower_extension(path) == ".json" && lower_extension(path.stem()) == ".scene";
+}
+
+SceneObjects read_scene_objects(const std::vector<std::filesystem::path>& files,
+                                TextureStore* textures, std::uint64_t memory_bytes) {
+  SceneObjects scene;
+  for (const std::filesystem::path& file : files) {
+    if (is_scene_file(file)) {
+      SceneReader(file, textures, memory_bytes, scene).read();
+    } else {
+      scene.objects.push_back({.file = file});
+    }
+  }
+  return scene;
+}
+
+std::vector<std::filesystem::path> object_files(const std::vector<std::filesystem::path>& files,
+                                                std::uint64_t memory_bytes) {
+  std::vector<std::filesystem::path> found;
+  for (SceneObject& object : read_scene_objects(files, nullptr, memory_bytes).objects)
+    found.push_back(std::move(object.file));
+  return found;
+}
+
+LightRig placed_lights(LightRig rig, const Placement& place) {
+  const auto turn = [&](glm::vec3& direction) {
+    const glm::dvec3 turned = glm::dmat3(place) * glm::dvec3(direction);
+    const double length = glm::length(turned);
+    if (length > 0) direction = glm::vec3(turned / length);
+  };
+  for (Sun& sun : rig.suns) turn(sun.to_sun);
+  for (PointLight& lamp : rig.points) lamp.position = place * glm::dvec4(lamp.position, 1);
+  for (SpotLight& lamp : rig.spots) {
+    lamp.position = place * glm::dvec4(lamp.position, 1);
+    turn(lamp.direction);
+  }
+  turn(rig.sky.up);
+  return rig;
+}
+
+}  // namespace ptc

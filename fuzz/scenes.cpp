@@ -1,0 +1,46 @@
+// Property, for any bytes as a scene file: it gives objects whose places can be inverted and whose
+// materials are in range, or is refused by a DataError, or by std::system_error when a file that it
+// names is missing.
+//
+// What follows the first zero byte becomes the file of places "a.txt" in the same directory.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <system_error>
+
+#include "engine/base/error.h"
+#include "engine/pipeline/build/scene_file.h"
+#include "fuzz/memory_file.h"
+#include "fuzz/require.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace ptc;
+  using fuzz::require;
+  std::span bytes(reinterpret_cast<const std::byte*>(data), size);
+  std::optional<fuzz::MemoryFile> places;
+  const auto zero =
+      static_cast<std::size_t>(std::ranges::find(bytes, std::byte{0}) - bytes.begin());
+  if (zero < bytes.size()) {
+    places.emplace(bytes.subspan(zero + 1), "a.txt");
+    bytes = bytes.first(zero);
+  }
+  const fuzz::MemoryFile file(bytes, "a.scene.json");
+  try {
+    const SceneObjects scene = read_scene_objects({file.path()}, nullptr, 1 << 20);
+    for (const SceneObject& object : scene.objects) {
+      require(!object.file.empty() && std::ranges::all_of(object.places, is_placement));
+      if (!object.material) continue;
+      for (int c = 0; c < 3; ++c)
+        require(object.material->albedo[c] >= 0 && object.material->albedo[c] <= 1 &&
+                object.material->emission[c] >= 0);
+    }
+    for (const MeshCamera& camera : scene.cameras)
+      require(camera.horizontal_fov > 0 && camera.horizontal_fov < 3.1416F);
+  } catch (const DataError&) {
+  } catch (const LimitError&) {
+  } catch (const std::system_error&) {
+  }
+  return 0;
+}
