@@ -35,41 +35,69 @@ inline double to_double(std::uint64_t v) {
   return std::bit_cast<double>(v | 0x4330000000000000) - 0x1p52;
 }
 
-/// Decodes points into columns, in blocks. The fields of a block are first gathered in small
-/// arrays, so that values that are decoded together lie together.
+/// The fields of a block of points, in small arrays, so that values that are decoded together lie
+/// together.
+struct Fields {
+  PositionBlock positions;
+  std::array<float, kPositionBlock> radius;
+  std::array<std::int16_t, kPositionBlock> u, v;
+  std::array<std::array<std::uint16_t, kPositionBlock>, 6> light;  // radiance, emission
+};
+
+/// Gathers the fields of n records.
+void gather(const PointRecord* points, std::size_t first, std::size_t n, bool emits, Fields& out) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const PointRecord& point = points[first + i];
+    out.radius[i] = point.radius;
+    out.u[i] = point.normal[0];
+    out.v[i] = point.normal[1];
+    for (std::size_t c = 0; c < 3; ++c) out.light[c][i] = point.radiance[c];
+    for (std::size_t c = 0; c < 3 && emits; ++c) out.light[3 + c][i] = point.emission[c];
+  }
+  decode_positions({points + first, n}, out.positions);
+}
+
+/// Gathers the fields of n points of a page.
+void gather(const PointPage& page, std::size_t first, std::size_t n, bool emits, Fields& out) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = static_cast<std::uint32_t>(first + i);
+    const LatticePoint position = page.position(at);
+    for (std::size_t axis = 0; axis < 3; ++axis) out.positions[axis][i] = position[axis];
+    out.radius[i] = page.radius(at);
+    const std::array<std::int16_t, 2> normal = page.normal(at);
+    out.u[i] = normal[0];
+    out.v[i] = normal[1];
+    const Half3 radiance = page.radiance(at);
+    for (std::size_t c = 0; c < 3; ++c) out.light[c][i] = radiance[c];
+    if (!emits) continue;
+    const Half3 emission = page.emission(at);
+    for (std::size_t c = 0; c < 3; ++c) out.light[3 + c][i] = emission[c];
+  }
+}
+
+/// Decodes points into columns, in blocks.
+/// @param points  records, or a page
 /// @param stride  values from one column to the next
 /// @param emits   whether there are columns of emission
-void decode_points(const PointRecord* points, std::size_t count, double unit, double* columns,
+template <class Points>
+void decode_points(const Points& points, std::size_t count, double unit, double* columns,
                    std::size_t stride, bool emits) {
   constexpr std::size_t kBlock = kPositionBlock;
   constexpr double kMax = 1e150;  // spec/nodes.md#node-number: what is stored ends at 3e38 anyway
-  PositionBlock positions;
-  std::array<float, kBlock> radius;
-  std::array<std::int16_t, kBlock> u, v;
-  std::array<std::array<std::uint16_t, kBlock>, 6> light;  // radiance, emission
-  const std::size_t colours = emits ? 6 : 3;
+  Fields fields;
   for (std::size_t first = 0; first < count; first += kBlock) {
-    // Gather the fields of one block.
     const std::size_t n = std::min(kBlock, count - first);
-    for (std::size_t i = 0; i < n; ++i) {
-      const PointRecord& point = points[first + i];
-      radius[i] = point.radius;
-      u[i] = point.normal[0];
-      v[i] = point.normal[1];
-      for (std::size_t c = 0; c < 3; ++c) light[c][i] = point.radiance[c];
-      for (std::size_t c = 3; c < colours; ++c) light[c][i] = point.emission[c - 3];
-    }
+    gather(points, first, n, emits, fields);
     // Decode positions, radii and areas.
     const auto out = [&](PointColumns::Column k) { return columns + k * stride + first; };
-    decode_positions({points + first, n}, positions);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t i = 0; i < n; ++i)
-        columns[axis * stride + first + i] = to_double(positions[axis][i]);
+        columns[axis * stride + first + i] = to_double(fields.positions[axis][i]);
     }
     double* const lattice_radius = out(PointColumns::kDiscRadius);
     double* const area = out(PointColumns::kDiscArea);
     for (std::size_t i = 0; i < n; ++i) {
-      const double r = radius[i];
+      const double r = fields.radius[i];
       const double scaled = r / unit;
       lattice_radius[i] = scaled < kMax ? scaled : kMax;
       area[i] = 2.0 * r * r;
@@ -79,16 +107,27 @@ void decode_points(const PointRecord* points, std::size_t count, double unit, do
     double* const y = out(PointColumns::kNormalY);
     double* const z = out(PointColumns::kNormalZ);
     for (std::size_t i = 0; i < n; ++i) {
-      const std::array<double, 3> normal = decode_octahedral_f64(u[i], v[i]);
+      const std::array<double, 3> normal = decode_octahedral_f64(fields.u[i], fields.v[i]);
       x[i] = normal[0];
       y[i] = normal[1];
       z[i] = normal[2];
     }
-    for (std::size_t c = 0; c < colours; ++c) {
+    for (std::size_t c = 0; c < (emits ? 6 : 3); ++c) {
       double* const to = columns + (PointColumns::kRed + c) * stride + first;
-      for (std::size_t i = 0; i < n; ++i) to[i] = decode_half(light[c][i]);
+      for (std::size_t i = 0; i < n; ++i) to[i] = decode_half(fields.light[c][i]);
     }
   }
+}
+
+/// Implements PointColumns::assign() for records.
+void decode_records(const PointRecord* points, std::size_t count, double unit, double* columns,
+                    std::size_t stride, bool emits) {
+  decode_points(points, count, unit, columns, stride, emits);
+}
+
+/// Implements PointColumns::assign() for a page.
+void decode_page(const PointPage& page, double unit, double* columns, std::size_t stride) {
+  decode_points(page, page.size(), unit, columns, stride, page.emits());
 }
 
 /// The values of a few consecutive points, one point in each lane; lanes from `end` on hold
@@ -115,33 +154,29 @@ HWY_INLINE V dot(const V (&a)[3], const V (&b)[3]) {
   return hn::Add(hn::Add(hn::Mul(a[0], b[0]), hn::Mul(a[1], b[1])), hn::Mul(a[2], b[2]));
 }
 
-/// Sets sphere, cone and slab of a node from its points. Mean and sums must be set: they give the
-/// centre and the axis.
-void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeSummary& node) {
-  // Broadcast centre and axes.
+/// Implements reach_of() for one instruction set.
+Reach reach(const PointColumns& points, std::size_t begin, std::size_t end, const ReachFrom& from) {
+  // Broadcast centre and directions.
   const D d;
-  const std::array<double, 3> slab_axis = slab_normal(node);
-  const bool has_axis = set_cone_axis(node, slab_axis);
-  const auto splat = [&](const auto& from, V(&to)[3]) {
-    for (std::size_t k = 0; k < 3; ++k) to[k] = hn::Set(d, static_cast<double>(from[k]));
+  const auto splat = [&](const auto& values, V(&to)[3]) {
+    for (std::size_t k = 0; k < 3; ++k) to[k] = hn::Set(d, static_cast<double>(values[k]));
   };
-  V mean[3], slab[3], axis[3];
-  splat(node.mean, mean);
-  splat(slab_axis, slab);
-  splat(node.cone_axis, axis);
+  V centre[3], slab[3], axis[3];
+  splat(from.centre, centre);
+  splat(from.normal, slab);
+  splat(from.direction, axis);
   const V axis_squared = dot(axis, axis), zero = hn::Zero(d), one = hn::Set(d, 1.0);
-  // Find the greatest reach of a disc from the centre and from the middle plane, and the smallest
-  // cosine of a normal to the axis.
+  // Find the greatest reach of a disc from the centre and from the plane, and the smallest cosine
+  // of a normal to the axis.
   V radius = zero, thickness = zero, cosine = one, greatest = zero;
   for (std::size_t i = begin; i < end; i += hn::Lanes(d)) {
     const Lanes point(points, i, end);
-    const V away[3] = {hn::Sub(point[PointColumns::kX], mean[0]),
-                       hn::Sub(point[PointColumns::kY], mean[1]),
-                       hn::Sub(point[PointColumns::kZ], mean[2])};
+    const V away[3] = {hn::Sub(point[PointColumns::kX], centre[0]),
+                       hn::Sub(point[PointColumns::kY], centre[1]),
+                       hn::Sub(point[PointColumns::kZ], centre[2])};
     const V wide = point[PointColumns::kDiscRadius];
     greatest = hn::Max(greatest, point.only(wide, zero));
     radius = hn::Max(radius, point.only(hn::Add(hn::Sqrt(dot(away, away)), wide), zero));
-    if (!has_axis) continue;
     const V n[3] = {point[PointColumns::kNormalX], point[PointColumns::kNormalY],
                     point[PointColumns::kNormalZ]};
     const V squared = dot(n, n);
@@ -150,14 +185,25 @@ void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeS
     const V cross[3] = {hn::Sub(hn::Mul(slab[1], n[2]), hn::Mul(slab[2], n[1])),
                         hn::Sub(hn::Mul(slab[2], n[0]), hn::Mul(slab[0], n[2])),
                         hn::Sub(hn::Mul(slab[0], n[1]), hn::Mul(slab[1], n[0]))};
-    const V reach = hn::Div(hn::Mul(wide, hn::Sqrt(dot(cross, cross))), hn::Sqrt(squared));
-    thickness = hn::Max(thickness, point.only(hn::Add(hn::Abs(dot(slab, away)), reach), zero));
+    const V tilted = hn::Div(hn::Mul(wide, hn::Sqrt(dot(cross, cross))), hn::Sqrt(squared));
+    thickness = hn::Max(thickness, point.only(hn::Add(hn::Abs(dot(slab, away)), tilted), zero));
   }
   // Reduce the lanes.
-  node.radius = hn::GetLane(hn::MaxOfLanes(d, radius));
-  node.greatest = hn::GetLane(hn::MaxOfLanes(d, greatest));
-  set_bounds(node, has_axis, hn::GetLane(hn::MinOfLanes(d, cosine)),
-             hn::GetLane(hn::MaxOfLanes(d, thickness)));
+  return {.radius = hn::GetLane(hn::MaxOfLanes(d, radius)),
+          .thickness = hn::GetLane(hn::MaxOfLanes(d, thickness)),
+          .cosine = hn::GetLane(hn::MinOfLanes(d, cosine)),
+          .greatest = hn::GetLane(hn::MaxOfLanes(d, greatest))};
+}
+
+/// Sets sphere, cone and slab of a node from its points. Mean and sums must be set: they give the
+/// centre and the axis.
+void bound(const PointColumns& points, std::size_t begin, std::size_t end, NodeSummary& node) {
+  const std::array<double, 3> slab = slab_normal(node);
+  const bool has_axis = set_cone_axis(node, slab);
+  const Reach found = reach(points, begin, end, {node.mean, slab, node.cone_axis});
+  node.radius = found.radius;
+  node.greatest = found.greatest;
+  set_bounds(node, has_axis, found.cosine, found.thickness);
 }
 
 /// Sums the emission of points towards the six axes.
@@ -206,10 +252,11 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
     const std::array<double, 4> light{1, value(PointColumns::kRed, i),
                                       value(PointColumns::kGreen, i),
                                       value(PointColumns::kBlue, i)};
-    for (std::size_t k = 0; k < 6; ++k) {
-      const double towards_axis = k % 2 == 0 ? normal[k / 2] : -normal[k / 2];
-      const double facing = area * (towards_axis > 0 ? towards_axis : 0.0);
-      for (std::size_t c = 0; c < 4; ++c) towards[k][c] += facing * light[c];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      // Of the two directions of an axis, a normal faces one.
+      std::array<double, 4>& sums = towards[2 * axis + (normal[axis] > 0 ? 0 : 1)];
+      const double facing = area * std::abs(normal[axis]);
+      for (std::size_t c = 0; c < 4; ++c) sums[c] += facing * light[c];
     }
   }
   // Fill in the node, and bound its points.
@@ -230,19 +277,36 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ptc {
 
-HWY_EXPORT(decode_points);
+HWY_EXPORT(decode_records);
+HWY_EXPORT(decode_page);
 HWY_EXPORT(summarise);
+HWY_EXPORT(reach);
 
 void PointColumns::assign(std::span<const PointRecord> points, double unit) {
-  stride_ = points.size() + kMaxLanes;
-  emits_ = std::ranges::any_of(points, [](const PointRecord& p) { return p.emission != Half3{}; });
-  values_.resize((emits_ ? kColumns : kEmittedRed) * stride_);
-  HWY_DYNAMIC_DISPATCH(decode_points)
+  make_room(points.size(), std::ranges::any_of(
+                               points, [](const PointRecord& p) { return p.emission != Half3{}; }));
+  HWY_DYNAMIC_DISPATCH(decode_records)
   (points.data(), points.size(), unit, values_.data(), stride_, emits_);
+}
+
+void PointColumns::assign(const PointPage& page, double unit) {
+  make_room(page.size(), page.emits());
+  HWY_DYNAMIC_DISPATCH(decode_page)(page, unit, values_.data(), stride_);
+}
+
+void PointColumns::make_room(std::size_t points, bool emits) {
+  stride_ = points + kMaxLanes;
+  emits_ = emits;
+  values_.resize((emits ? kColumns : kEmittedRed) * stride_);
 }
 
 NodeSummary summarise_points(const PointColumns& points, std::size_t begin, std::size_t end) {
   return HWY_DYNAMIC_DISPATCH(summarise)(points, begin, end);
+}
+
+Reach reach_of(const PointColumns& points, std::size_t begin, std::size_t end,
+               const ReachFrom& from) {
+  return HWY_DYNAMIC_DISPATCH(reach)(points, begin, end, from);
 }
 
 }  // namespace ptc
