@@ -100,11 +100,11 @@ double snorm16(std::uint16_t bits) noexcept {
   return std::max(static_cast<double>(static_cast<std::int16_t>(bits)) / kCosSteps, -1.0);
 }
 
-NodeSummary decode_summary(const GroupView& group, int i) {
+/// Decodes the summary of child i into `node`, which has its default values.
+void decode_summary(const GroupView& group, int i, NodeSummary& node) {
   const auto u16 = [i](const std::byte* column) { return GroupView::u16_at(column, i); };
   const LatticePoint corner = decode_morton(group.cell());
   const double step = cell_edge(group.level()) / kMeanSteps;
-  NodeSummary node;
   const std::array columns{group.mean_x(), group.mean_y(), group.mean_z()};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     node.mean[axis] = static_cast<double>(corner[axis]) + u16(columns[axis]) * step;
@@ -118,7 +118,9 @@ NodeSummary decode_summary(const GroupView& group, int i) {
   node.cone_cos = static_cast<float>(snorm16(u16(group.cone_cos())));
   for (std::size_t k = 0; k < 6; ++k) {
     const int axis = static_cast<int>(k);
-    node.facing[k] = u16(group.facing(axis)) / kFacingSteps * node.area;
+    const std::uint16_t share = u16(group.facing(axis));
+    if (share == 0) continue;  // facing, flux and power stay 0
+    node.facing[k] = share / kFacingSteps * node.area;
     const auto light_of = [&](const std::byte* column) {
       const std::array<float, 3> light =
           decode_rgbe(load<std::uint32_t>(column, 4 * static_cast<std::size_t>(i)));
@@ -128,7 +130,6 @@ NodeSummary decode_summary(const GroupView& group, int i) {
     node.flux[k] = light_of(group.radiance(axis));
     if (node.emits) node.power[k] = light_of(group.emission(axis));
   }
-  return node;
 }
 
 }  // namespace
@@ -180,7 +181,9 @@ NodeGroup NodePage::decode(std::uint32_t slot) const {
   group.level = view.level();
   group.children.resize(static_cast<std::size_t>(view.size()));
   for (int i = 0; i < view.size(); ++i) {
-    group.children[static_cast<std::size_t>(i)] = {view.child(i), decode_summary(view, i)};
+    NodeChild& child = group.children[static_cast<std::size_t>(i)];
+    child.ref = view.child(i);
+    decode_summary(view, i, child.node);
   }
   return group;
 }
