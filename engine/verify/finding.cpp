@@ -89,4 +89,14 @@ void Findings::add(Finding finding) {
   if (damage && fail_fast_) throw StopVerifying();
 }
 
+bool Findings::append(const Findings& others) {
+  const std::uint64_t all = others.damage_ + others.warnings_, kept = others.kept_.size();
+  if (kept < all && kept < keep_ - kept_.size()) return false;
+  const std::uint64_t damage = damage_ + others.damage_, warnings = warnings_ + others.warnings_;
+  for (const Finding& finding : others.kept_) add(finding);
+  damage_ = damage;
+  warnings_ = warnings;
+  return true;
+}
+
 }  // namespace ptc

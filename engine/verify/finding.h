@@ -105,6 +105,16 @@ class Findings {
   /// @throws StopVerifying after the first damage when the constructor was given `fail_fast`
   void add(Finding finding);
 
+  /// Returns a collection without findings, for a check whose findings may be appended later. It
+  /// keeps as many as this one still does, and stops as this one does.
+  [[nodiscard]] Findings next() const { return {keep_ - kept_.size(), fail_fast_}; }
+
+  /// Appends the findings of a check that followed.
+  /// @return  false, and appends nothing, when the other check did not keep some that this one
+  /// keeps
+  /// @throws StopVerifying as add() does
+  [[nodiscard]] bool append(const Findings& others);
+
   /// Counts findings that another check found and did not keep.
   void count(std::uint64_t damage, std::uint64_t warnings) noexcept {
     damage_ += damage;

@@ -32,8 +32,7 @@ namespace {
 constexpr char kPadding[] = "spec/container.md#padding";
 
 constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
-constexpr std::size_t kMaxCachedPages = 1024;
-constexpr std::size_t kMinCachedPages = 8;
+constexpr std::size_t kMaxCachedPages = 1024;  // of the tree that is compared with another
 constexpr std::size_t kPagesAtOnce = 256;
 
 /// A range of bytes of a file, from `begin` up to `end`.
@@ -85,8 +84,8 @@ class FileCheck {
     return std::move(report_);
   }
 
-  /// Divides the memory: what is fixed first, and the rest for node pages.
-  /// @throws LimitError when less than kMinCachedPages remain
+  /// Divides the memory: what is fixed first, and the rest for the walks through the tree.
+  /// @throws LimitError when less than one of them needs remains
   void keep_to_cap() {
     if (!survey_.superblock) return;
     const Superblock& s = *survey_.superblock;
@@ -95,11 +94,11 @@ class FileCheck {
         survey_.container ? s.node_groups : 0;  // a superblock alone proves no number of groups
     MemoryBudget budget(options_.memory_bytes, "this file", "memory_bytes");
     budget.charge("the program", kBaseBytes);
-    budget.charge("the list of pages", 100 * survey_.sites.size());
+    budget.charge("the list of pages", 110 * survey_.sites.size());
     budget.charge("groups of nodes", groups / 8);
     budget.charge("threads", 3 * page * executor_.threads());
-    budget.charge("a leaf", 100 * std::uint64_t{s.leaf_points});
-    const std::uint64_t left = budget.rest("node pages", kMinCachedPages * page);
+    const std::uint64_t left = budget.rest("walks through the tree", TreeMemory::least_bytes(s));
+    tree_memory_ = TreeMemory::divided(left, s, executor_.threads());
     cached_pages_ = static_cast<std::size_t>(std::min<std::uint64_t>(kMaxCachedPages, left / page));
   }
 
@@ -289,7 +288,7 @@ class FileCheck {
     if (options_.level >= VerifyLevel::content) report_.points = points;
   }
 
-  /// Walks the tree, excluding damaged pages, and takes over what it counted.
+  /// Checks the tree, excluding damaged pages, and takes over what it counted.
   void check_tree(Progress& progress) {
     // Without its parts a scene has no tree to walk.
     if (survey_.header->has_parts() && survey_.container->parts().empty()) return;
@@ -298,14 +297,15 @@ class FileCheck {
       if (!site.sound) damaged[survey_.container->number_of(site.page)] = true;
     }
     progress.begin("check tree", survey_.superblock->points, "points");
-    const TreeCounts tree =
-        verify_tree(*survey_.container, damaged, cached_pages_, findings_, progress);
+    const CheckedTree tree =
+        verify_tree(*survey_.container, damaged, tree_memory_, findings_, executor_, progress);
     progress.end();
+    static_cast<void>(findings_.append(tree.findings));  // it kept as many as these do
     if (survey_.container->parts().empty()) count_points();
-    report_.nodes = tree.nodes;
-    report_.groups = tree.groups;
-    report_.levels = tree.levels;
-    report_.tree_checked = tree.complete;
+    report_.nodes = tree.counts.nodes;
+    report_.groups = tree.counts.groups;
+    report_.levels = tree.counts.levels;
+    report_.tree_checked = tree.counts.complete;
   }
 
   /// Counts the points of sound pages.
@@ -334,7 +334,8 @@ class FileCheck {
   FlipBudget flips_;
   Survey survey_;
   VerifyReport report_;
-  std::size_t cached_pages_ = kMinCachedPages;
+  TreeMemory tree_memory_;
+  std::size_t cached_pages_ = 1;        ///< of node pages, to compare the tree with another
   std::uint64_t damaged_in_parts_ = 0;  ///< pages
 };
 

@@ -63,8 +63,10 @@ struct VerifyReport {
 /// The summary that a node stores is compared with the sum over its points or its own children,
 /// within the quantisation (spec/nodes.md#quantisation); its sphere and cone must enclose theirs.
 /// @throws std::system_error; LimitError naming the smallest cap that works
-/// Memory: 100 bytes for each page of the file, one bit for each group, three pages for each
-/// thread, and node pages up to the cap.
+/// What is found does not depend on the number of threads and on the cap.
+/// Memory: 110 bytes for each page of the file, one bit for each group, three pages for each
+/// thread, and what the walks through the tree take up to the cap: 64 node pages each, some more
+/// pages, and the points of a leaf.
 [[nodiscard]] VerifyReport verify_container(const std::filesystem::path& path,
                                             const VerifyOptions& options, Progress& progress);
 

@@ -15,7 +15,6 @@
 #include <fmt/format.h>
 
 #include "engine/base/numbers.h"
-#include "format/scalar.h"
 
 namespace ptc {
 namespace {
@@ -43,10 +42,6 @@ const char* axis_name(std::size_t k) {
   return kNames[k];
 }
 
-double distance(const Vec3& a, const Vec3& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
 Vec3 widen(const std::array<float, 3>& v) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
@@ -55,10 +50,16 @@ double dot(const Vec3& a, const Vec3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// Returns the angle between two vectors [rad], which stays exact where they are nearly parallel.
-double angle_between(const Vec3& a, const Vec3& b) {
-  const Vec3 cross{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-  return std::atan2(std::sqrt(dot(cross, cross)), dot(a, b));
+double length(const Vec3& a) {
+  return std::sqrt(dot(a, a));
+}
+
+double distance(const Vec3& a, const Vec3& b) {  // lattice coordinates: no square overflows
+  return length({a[0] - b[0], a[1] - b[1], a[2] - b[2]});
+}
+
+Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 std::optional<Fault> compare_mean(const NodeSummary& stored, const NodeSummary& exact, int level) {
@@ -66,6 +67,7 @@ std::optional<Fault> compare_mean(const NodeSummary& stored, const NodeSummary& 
   const double step = edge / 65536;
   for (std::size_t k = 0; k < 3; ++k) {
     const double off = exact.mean[k] - stored.mean[k];
+    if (std::abs(off) <= 0.5 * step + kLatticeSlack) continue;
     const bool at_end = off > 0 && std::fmod(stored.mean[k], edge) == edge - step;
     if (std::abs(off) > (at_end ? 1.0 : 0.5) * step + kLatticeSlack) {
       return Fault{kMean, fmt::format("the mean position {} along {} is not that of the points, {}",
@@ -95,9 +97,9 @@ Vec3 sum_of_normals(const NodeSummary& node) {
 /// where they cancel out.
 Vec3 slab_normal(const NodeSummary& node) {
   Vec3 sum = sum_of_normals(node);
-  const double length = std::sqrt(dot(sum, sum));
-  if (!(length > 0)) return {};
-  for (double& s : sum) s /= length;
+  const double norm = length(sum);
+  if (!(norm > 0)) return {};
+  for (double& s : sum) s /= norm;
   return sum;
 }
 
@@ -153,6 +155,7 @@ std::optional<Fault> compare_greatest(const NodeSummary& stored, const NodeSumma
 std::optional<Fault> compare_light(const NodeSummary& stored, const NodeSummary& exact) {
   if (!(stored.area > 0) || !(exact.area > 0)) return {};
   for (std::size_t k = 0; k < 6; ++k) {
+    if (stored.facing[k] == 0 && exact.facing[k] == 0) continue;
     const double found = stored.facing[k] / stored.area;
     const double share = std::min(exact.facing[k] / exact.area, 1.0);
     if (std::abs(found - share) > 0.5 / 65535 + kRelative) {
@@ -175,25 +178,39 @@ std::optional<Fault> compare_light(const NodeSummary& stored, const NodeSummary&
 
 std::optional<Fault> compare_cone(const NodeSummary& stored, const NodeSummary& exact) {
   constexpr double kAxisAngle = 0.018;
+  constexpr double kAxisTangent = 0.018;  // less than tan(kAxisAngle)
+  constexpr double kCosStep = 1.0 / 32767;
   constexpr double kCosSlack = 1e-5;
   constexpr double kHalfAngleSlack = 1e-3;
   // Where the normals nearly cancel out, an axis is a matter of rounding.
-  const double length = distance(sum_of_normals(exact), {});
-  const bool unclear =
-      length > 0.1 * kRelative * exact.area && length < 10 * kRelative * exact.area;
-  if (unclear && static_cast<double>(stored.cone_cos) <= -1) return {};
-  const double turned = angle_between(widen(stored.cone_axis), widen(exact.cone_axis));
+  const double sum = length(sum_of_normals(exact));
+  const bool unclear = sum > 0.1 * kRelative * exact.area && sum < 10 * kRelative * exact.area;
+  const auto found = static_cast<double>(stored.cone_cos);
+  if (unclear && found <= -1) return {};
+  // Accept what is near the needed cosine without finding angles: with the half angle h
+  // and the turn t it is cos(h + t) = cos h cos t - sin h sin t, and h + t < pi where cos h > -cos
+  // t.
+  const Vec3 axis = widen(stored.cone_axis), mean = widen(exact.cone_axis);
+  const double across = length(cross(axis, mean)), along = dot(axis, mean);
+  const double cos_half = std::clamp(static_cast<double>(exact.cone_cos), -1.0, 1.0);
+  const double norm = std::sqrt(across * across + along * along);
+  if (across < kAxisTangent * along && cos_half * norm > -along) {
+    const double sin_half = std::sqrt(1 - cos_half * cos_half);
+    const double cosine = (cos_half * along - sin_half * across) / norm;
+    if (found <= cosine + kCosSlack && found >= cosine - kCosStep) return {};
+  }
+  // Compare angles.
+  const double turned = std::atan2(across, along);
   if (turned > kAxisAngle && !unclear) {
     return Fault{
         kCone,
         fmt::format("the cone's axis is {} rad away from the mean normal of the points", turned)};
   }
-  const double half = std::acos(std::clamp(static_cast<double>(exact.cone_cos), -1.0, 1.0));
+  const double half = std::acos(cos_half);
   const double needed = half + turned >= kPiDouble ? -1.0 : std::cos(half + turned);
-  const auto found = static_cast<double>(stored.cone_cos);
   const double widest = std::cos(std::min(half + turned + kHalfAngleSlack, kPiDouble));
   const double narrowest = std::cos(std::clamp(half + turned - kHalfAngleSlack, 0.0, kPiDouble));
-  if (found <= narrowest + kCosSlack && found >= widest - 1.0 / 32767) return {};
+  if (found <= narrowest + kCosSlack && found >= widest - kCosStep) return {};
   return Fault{kCone, fmt::format("the cosine {} of the cone's angle is not the one that the "
                                   "points need, {}",
                                   found, needed)};
@@ -212,40 +229,41 @@ std::optional<Fault> compare_summary(const NodeSummary& stored, const NodeSummar
   return compare_cone(stored, exact);
 }
 
-std::optional<Fault> check_bounds(const NodeSummary& stored, std::span<const PointRecord> points,
-                                  double unit) {
+std::optional<Fault> check_bounds(const NodeSummary& stored, const PointColumns& points,
+                                  std::size_t begin, std::size_t end) {
   const Vec3 axis = widen(stored.cone_axis);
+  const double axis_length = length(axis);
   const double radius = stored.radius * (1 + kRelative) + kLatticeSlack;
-  const Vec3 slab = slab_normal(stored);
   const double thickness = stored.thickness + kRelative * stored.radius + kLatticeSlack;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    // Check the disc against the sphere.
-    const LatticePoint at = decode_morton(points[i].key);
-    const Vec3 position{static_cast<double>(at[0]), static_cast<double>(at[1]),
-                        static_cast<double>(at[2])};
-    const double reach =
-        distance(position, stored.mean) + static_cast<double>(points[i].radius) / unit;
-    if (reach > radius && stored.radius < kMaxUfloat16) {
-      return Fault{kSphere,
-                   fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
-                               "position, beyond the sphere's radius of {}",
-                               i, reach, stored.radius)};
-    }
-    // Check the disc against the slab: a disc tilted against it reaches further.
-    const Vec3 normal = decode_octahedral_f64(points[i].normal[0], points[i].normal[1]);
-    const double tilt = std::sin(angle_between(slab, normal));
-    const double height = std::abs(dot(slab, position) - dot(slab, stored.mean)) +
-                          static_cast<double>(points[i].radius) / unit * tilt;
-    if (height > thickness && stored.thickness < kMaxUfloat16) {
-      return Fault{kSlab,
-                   fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
-                               "plane, beyond the slab's thickness of {}",
-                               i, height, stored.thickness)};
-    }
-    // Check the normal against the cone.
-    if (dot(normal, axis) < static_cast<double>(stored.cone_cos) - kAngleSlack) {
-      return Fault{kCone,
-                   fmt::format("the normal of disc {} of the leaf lies outside the cone", i)};
+  const ReachFrom from{stored.mean, slab_normal(stored), stored.cone_axis};
+  // Returns the bound that some of the discs reach beyond.
+  enum class Bound { none, sphere, slab, cone };
+  const auto broken_by = [&](const Reach& reach) {
+    if (reach.radius > radius && stored.radius < kMaxUfloat16) return Bound::sphere;
+    if (reach.thickness > thickness && stored.thickness < kMaxUfloat16) return Bound::slab;
+    const double least = static_cast<double>(stored.cone_cos) - kAngleSlack;
+    return reach.cosine * axis_length < least ? Bound::cone : Bound::none;
+  };
+  if (broken_by(reach_of(points, begin, end, from)) == Bound::none) return {};
+  // Name the first disc that does.
+  for (std::size_t i = begin; i < end; ++i) {
+    const Reach reach = reach_of(points, i, i + 1, from);
+    switch (broken_by(reach)) {
+      case Bound::none:
+        continue;
+      case Bound::sphere:
+        return Fault{kSphere,
+                     fmt::format("disc {} of the leaf reaches {} lattice units from the mean "
+                                 "position, beyond the sphere's radius of {}",
+                                 i - begin, reach.radius, stored.radius)};
+      case Bound::slab:
+        return Fault{kSlab,
+                     fmt::format("disc {} of the leaf reaches {} lattice units from the middle "
+                                 "plane, beyond the slab's thickness of {}",
+                                 i - begin, reach.thickness, stored.thickness)};
+      case Bound::cone:
+        return Fault{kCone, fmt::format("the normal of disc {} of the leaf lies outside the cone",
+                                        i - begin)};
     }
   }
   return {};

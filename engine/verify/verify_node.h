@@ -1,12 +1,12 @@
 // The whole-file check of one node: the summary that it stores against the points below it.
 #pragma once
 
+#include <cstddef>
 #include <optional>
-#include <span>
 #include <string>
 
+#include "engine/octree/point_columns.h"
 #include "format/node_page.h"
-#include "format/point_record.h"
 
 namespace ptc {
 
@@ -41,10 +41,10 @@ struct Fault {
                                                    const NodeSummary& exact, int cell_level);
 
 /// Checks that the stored sphere and slab contain every disc and the stored cone every normal.
-/// @param points  all points of a leaf
-/// @param unit    lattice unit in scene units
+/// @param begin, end  the points of a leaf, which are all from `begin` up to `end`
 /// @return  the first disc or normal that lies outside; empty when there is none
 [[nodiscard]] std::optional<Fault> check_bounds(const NodeSummary& stored,
-                                                std::span<const PointRecord> points, double unit);
+                                                const PointColumns& points, std::size_t begin,
+                                                std::size_t end);
 
 }  // namespace ptc

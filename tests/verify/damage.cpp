@@ -22,11 +22,11 @@ std::vector<Surfel> small_scene() {
   return surfels;
 }
 
-std::string fault_of(const std::filesystem::path& path) {
+std::string fault_of(const std::filesystem::path& path, unsigned threads) {
   Progress silent;
   std::string faults;
   for (const Finding& finding :
-       verify_container(path, {.threads = 1, .flip_budget = 0}, silent).findings) {
+       verify_container(path, {.threads = threads, .flip_budget = 0}, silent).findings) {
     faults += line_of(finding) + "\n";
   }
   return faults;

@@ -19,7 +19,7 @@ namespace ptc::test {
 
 /// Returns what verify_container() finds in a file, one line for each fault; empty when it finds
 /// none.
-[[nodiscard]] std::string fault_of(const std::filesystem::path& path);
+[[nodiscard]] std::string fault_of(const std::filesystem::path& path, unsigned threads = 1);
 
 /// A container of raw pages in memory. Payloads, page headers and superblock can be changed;
 /// write() corrects all checksums.

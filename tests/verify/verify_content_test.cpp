@@ -82,10 +82,13 @@ struct Specimen {
   explicit Specimen(const std::vector<Surfel>& surfels, const BuildOptions& tree = {})
       : container(write_raw(directory / "scene.ptcx", surfels, tree)) {}
 
-  /// Returns what verify_container() reports about the container as it is now.
+  /// Returns what verify_container() reports about the container as it is now, for any number of
+  /// threads.
   [[nodiscard]] std::string fault() {
     container.write(directory / "wrong.ptcx");
-    return fault_of(directory / "wrong.ptcx");
+    const std::string found = fault_of(directory / "wrong.ptcx");
+    CHECK(fault_of(directory / "wrong.ptcx", 3) == found);
+    return found;
   }
 };
 

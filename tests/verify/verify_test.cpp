@@ -91,6 +91,7 @@ TEST_CASE("verify: every vector gets its verdict", "[verify]") {
       if (entry.path().extension() != ".ptcx") continue;
       INFO(kind << "/" << name);
       const std::string fault = fault_of(entry.path());
+      CHECK(fault_of(entry.path(), 3) == fault);
       ++seen;
       if (std::string(kind) == "good") {
         CHECK(fault == "");
@@ -104,20 +105,6 @@ TEST_CASE("verify: every vector gets its verdict", "[verify]") {
     }
     CHECK(seen > 10);
   }
-}
-
-TEST_CASE("verify: the report does not depend on threads or memory", "[verify]") {
-  const TemporaryDirectory directory;
-  const auto path = directory / "scene.ptcx";
-  write_scene(path, random_surfels(20000, 3), {}, 12, Codec::zstd);
-  const VerifyReport whole = verify(path);
-  for (const unsigned threads : {1U, 3U}) {
-    const VerifyReport report = verify(path, {.memory_bytes = 34 << 20, .threads = threads});
-    CHECK(report.nodes == whole.nodes);
-    CHECK(report.groups == whole.groups);
-  }
-  CHECK_THROWS_WITH(verify(path, {.memory_bytes = 1 << 20}),
-                    Catch::Contains("the least that works is"));
 }
 
 TEST_CASE("verify: every flipped byte of a file is found", "[verify]") {
