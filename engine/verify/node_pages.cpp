@@ -26,7 +26,7 @@ std::unordered_map<std::uint32_t, NodePages::Page>::iterator NodePages::load(std
   }
   // Read and decode the new page.
   fresh.payload.resize(container_.page_payload_limit());
-  fresh.header = container_.read_page(page, fresh.payload, decoder_);
+  fresh.header = checked_.read(page, fresh.payload, decoder_);
   return pages_.emplace(page, std::move(fresh)).first;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/store/reader.h"
+#include "engine/verify/checked_pages.h"
 #include "format/node_page.h"
 
 namespace ptc {
@@ -15,10 +16,10 @@ namespace ptc {
 /// Memory: one decoded page for each page of the capacity.   Threads: not thread-safe.
 class NodePages {
  public:
-  /// @param container  must outlive this
-  /// @param capacity   pages that are kept, at least 1
-  NodePages(const ContainerReader& container, std::size_t capacity)
-      : container_(container), capacity_(capacity) {}
+  /// @param container, checked  must outlive this
+  /// @param capacity            pages that are kept, at least 1
+  NodePages(const ContainerReader& container, CheckedPages& checked, std::size_t capacity)
+      : container_(container), checked_(checked), capacity_(capacity) {}
 
   /// A decoded node page and where its payload lies.
   struct Place {
@@ -40,6 +41,7 @@ class NodePages {
   std::unordered_map<std::uint32_t, Page>::iterator load(std::uint32_t page);
 
   const ContainerReader& container_;
+  CheckedPages& checked_;
   std::size_t capacity_;
   PageDecoder decoder_;
   std::unordered_map<std::uint32_t, Page> pages_;

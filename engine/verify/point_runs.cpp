@@ -47,9 +47,10 @@ void TreeReport::page(std::uint32_t page, std::uint64_t from_header, const char*
 }
 
 PointRuns::PointRuns(const ContainerReader& container, const std::vector<bool>& damaged,
-                     const TreeReport& report)
+                     CheckedPages& checked, const TreeReport& report)
     : container_(container),
       damaged_(damaged),
+      checked_(checked),
       report_(report),
       per_page_(points_per_page(container.header())),
       unit_(container.header().frame.unit()),
@@ -115,7 +116,7 @@ void PointRuns::load(std::uint32_t page) {
   if (page == page_) return;
   add_up();
   page_ = kNoPage;
-  count_ = container_.read_page(page, payload_, decoder_).record_count;
+  count_ = checked_.read(page, payload_, decoder_).record_count;
   columns_.assign(PointPage(payload_.data(), count_, container_.header().point_bytes), unit_);
   page_ = page;
 }

@@ -13,6 +13,7 @@
 
 #include "engine/octree/point_columns.h"
 #include "engine/store/reader.h"
+#include "engine/verify/checked_pages.h"
 #include "engine/verify/finding.h"
 #include "format/point_record.h"
 
@@ -65,10 +66,10 @@ struct PointRun {
 /// Memory: bytes(); at most three pages, three times as much for columns, and one leaf.
 class PointRuns {
  public:
-  /// @param container, damaged, report  must outlive this
+  /// @param container, damaged, checked, report  must outlive this
   /// @param damaged  by page number, whether the page is damaged
   PointRuns(const ContainerReader& container, const std::vector<bool>& damaged,
-            const TreeReport& report);
+            CheckedPages& checked, const TreeReport& report);
 
   /// Returns the greatest number of bytes that an object takes for one container.
   [[nodiscard]] static std::uint64_t bytes(const Superblock& superblock) noexcept;
@@ -98,6 +99,7 @@ class PointRuns {
 
   const ContainerReader& container_;
   const std::vector<bool>& damaged_;
+  CheckedPages& checked_;
   const TreeReport& report_;
   std::uint64_t per_page_;
   double unit_;  ///< lattice unit in scene units

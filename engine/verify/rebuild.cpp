@@ -59,7 +59,8 @@ class StoredGroups {
   StoredGroups(const ContainerReader& container, std::size_t cached_pages)
       : container_(container),
         node_pages_(container.node_pages()),
-        pages_(container, cached_pages) {
+        checked_(container),
+        pages_(container, checked_, cached_pages) {
     const Superblock& s = container.superblock();
     if (s.points > 0) descend(node_pages_[s.root_page], s.root_slot);
   }
@@ -100,6 +101,7 @@ class StoredGroups {
 
   const ContainerReader& container_;
   PageNumbers::Range node_pages_;
+  CheckedPages checked_;
   NodePages pages_;
   std::vector<Open> path_;
 };

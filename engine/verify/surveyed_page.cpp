@@ -15,43 +15,18 @@
 
 #include <fmt/format.h>
 
+#include "engine/verify/checked_pages.h"
 #include "format/bytes.h"
 #include "format/checksum.h"
-#include "format/node_page.h"
-#include "format/parts_page.h"
-#include "format/point_page.h"
 
 namespace ptc {
 namespace {
 
 constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
-constexpr char kPageKeys[] = "spec/container.md#page-keys";
-constexpr char kPageLevel[] = "spec/container.md#page-level";
 constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 constexpr std::size_t kPayloadHashAt = 48;  // offset of the payload's checksum in the page header
-
-/// Compares the key range of a page header with that of its records, `whose` they are.
-void check_keys(const PageHeader& header, std::uint64_t first, std::uint64_t last,
-                const char* whose) {
-  if (header.first_key == first && header.last_key == last) return;
-  throw FormatError(32, kPageKeys, fmt::format("the key range is not that of its {}", whose));
-}
-
-/// Compares the level and the key range of a page header with those of its groups.
-void check_groups(const PageHeader& header, const NodePage& nodes) {
-  int least = kMaxLevel;
-  std::uint64_t first = ~std::uint64_t{0}, last = 0;
-  for (std::uint32_t slot = 0; slot < nodes.size(); ++slot) {
-    least = std::min(least, nodes[slot].level());
-    first = std::min(first, nodes[slot].cell().high);
-    last = std::max(last, nodes[slot].cell().high);
-  }
-  if (least != header.level)
-    throw FormatError(24, kPageLevel, "the level is not the lowest level of its groups");
-  check_keys(header, first, last, "groups");
-}
 
 /// Returns the name of a page for messages, such as "node page 3".
 std::string page_name(PageType type, std::uint8_t group, std::uint32_t rank) {
@@ -114,7 +89,7 @@ std::optional<Finding> SurveyedPage::check(const PageSite& site, int level, Flip
       rules.points = survey_.container->superblock().points;
     }
     decode_payload(header_, stored(), rules, payload_, decoder_);
-    check_content();
+    check_page_keys(header_, payload(), survey_.header->point_bytes);
   } catch (const FormatError& error) {
     Finding finding = finding_in(site, 3, error);
     finding.cause = Cause::writer;
@@ -206,21 +181,6 @@ void SurveyedPage::check_channels() const {
     return;
   throw FormatError(16, kAttributePages,
                     "the payload does not have the size that its channels need");
-}
-
-void SurveyedPage::check_content() const {
-  const std::byte* const data = payload_.data();
-  if (header_.type == PageType::point) {
-    const PointPage points(data, header_.record_count, survey_.header->point_bytes);
-    check_keys(header_, points[0].key.high, points[points.size() - 1].key.high, "points");
-  }
-  if (header_.type == PageType::parts) {
-    const auto records = std::span<const std::byte>(payload_).first(header_.raw_bytes);
-    const PartRecord first = decode_part(records.first(kPartBytes));
-    const PartRecord last = decode_part(records.last(kPartBytes));
-    check_keys(header_, first.first_key.high, last.last_key.high, "parts");
-  }
-  if (header_.type == PageType::node) check_groups(header_, NodePage(data, header_.record_count));
 }
 
 }  // namespace ptc

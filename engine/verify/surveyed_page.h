@@ -46,7 +46,6 @@ class SurveyedPage {
   [[nodiscard]] std::optional<Finding> check_payload(const PageSite& site, FlipBudget& budget);
   [[nodiscard]] bool has_content() const;
   void check_channels() const;
-  void check_content() const;
 
   /// Flips back the bit that a finding names, if this checker repairs.
   /// @return  whether the bit was flipped

@@ -67,7 +67,8 @@ void ReachedGroups::report_rest(const TreeReport& report) const {
 }
 
 TreeWalk::TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged,
-                   std::size_t cached_pages, ReachedGroups& reached, Findings& findings)
+                   CheckedPages& checked, std::size_t cached_pages, ReachedGroups& reached,
+                   Findings& findings)
     : container_(container),
       superblock_(container.superblock()),
       node_pages_(container.node_pages()),
@@ -75,8 +76,8 @@ TreeWalk::TreeWalk(const ContainerReader& container, const std::vector<bool>& da
       reached_(reached),
       findings_(findings),
       report_(container, findings),
-      pages_(container, cached_pages),
-      points_(container, damaged, report_) {}
+      pages_(container, checked, cached_pages),
+      points_(container, damaged, checked, report_) {}
 
 void TreeWalk::begin() {
   // Count the groups of parts, whether the top leads to them or not.

@@ -81,11 +81,12 @@ struct Subtree {
 /// Memory: the cached pages, PointRuns::bytes(), and one group for each level.
 class TreeWalk {
  public:
-  /// @param container, damaged, reached, findings  must outlive this
+  /// @param container, damaged, checked, reached, findings  must outlive this
   /// @param damaged       by page number, whether the page is damaged
   /// @param cached_pages  node pages that are kept decoded, at least 1
   TreeWalk(const ContainerReader& container, const std::vector<bool>& damaged,
-           std::size_t cached_pages, ReachedGroups& reached, Findings& findings);
+           CheckedPages& checked, std::size_t cached_pages, ReachedGroups& reached,
+           Findings& findings);
 
   /// Enters the root group.
   void begin();

@@ -9,6 +9,10 @@
 //
 // Levels 0 to 2 work on any file whose identity is known; 3 and 4 need a file that opens, because
 // the tree refers to pages by their numbers. Pages with a fault are excluded from the tree's check.
+//
+// To decode pages of points and nodes once, level 3 checks their content where the tree leads to
+// them. Afterwards it checks the pages that the tree did not lead to. Only where a page has a fault
+// that the tree came upon is the tree checked again, without that page.
 #include "engine/verify/verify.h"
 
 #include <algorithm>
@@ -20,6 +24,7 @@
 #include "engine/base/memory_budget.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/store/commit.h"
+#include "engine/verify/checked_pages.h"
 #include "engine/verify/rebuild.h"
 #include "engine/verify/surveyed_page.h"
 #include "engine/verify/verify_tree.h"
@@ -56,7 +61,8 @@ class FileCheck {
           survey_file(file_, findings_, flips_, options_.level == VerifyLevel::commit, progress);
       keep_to_cap();
       if (options_.level >= VerifyLevel::directory) {
-        check_pages(progress);
+        report_.pages = 0;
+        check_pages([&](const PageSite& site) { return first_level(site); }, progress);
         explain_refusal();
       }
       if (options_.level >= VerifyLevel::payload && survey_.container) check_padding();
@@ -110,24 +116,40 @@ class FileCheck {
     if (std::ranges::none_of(findings_.kept(), same)) findings_.add(*survey_.refusal);
   }
 
+  /// Returns the level to which a page is checked at first. What point and node pages hold is
+  /// checked where the tree leads to them, so that they are decoded once.
+  [[nodiscard]] int first_level(const PageSite& site) const {
+    const int level = static_cast<int>(options_.level);
+    return walks_to(site) ? std::min(level, static_cast<int>(VerifyLevel::payload)) : level;
+  }
+
+  /// Says whether the check of the tree reads a page, as far as all is sound.
+  [[nodiscard]] bool walks_to(const PageSite& site) const {
+    return survey_.container && !survey_.header->has_parts() && site.page != kNoPage &&
+           (site.entry.type == PageType::point || site.entry.type == PageType::node);
+  }
+
   /// Checks the pages in rounds of kPagesAtOnce, so that findings are added in the order of the
   /// file for any number of threads.
-  void check_pages(Progress& progress) {
+  /// @param level_of  returns the level to which a page is checked; 0: it is not
+  template <class LevelOf>
+  void check_pages(const LevelOf& level_of, Progress& progress) {
     progress.begin("check pages", survey_.sites.size(), "pages");
     std::vector<std::unique_ptr<SurveyedPage>> pages(executor_.threads());
     std::vector<std::optional<Finding>> found(kPagesAtOnce);
-    report_.pages = 0;
     for (std::size_t first = 0; first < survey_.sites.size(); first += kPagesAtOnce) {
       // Check one round of pages, while the system reads the next.
       const std::size_t count = std::min(kPagesAtOnce, survey_.sites.size() - first);
       read_ahead(first + count);
       executor_.for_each(count, [&](std::size_t i, unsigned thread) {
+        const PageSite& site = survey_.sites[first + i];
+        const int level = level_of(site);
+        if (level == 0) return;
         if (!pages[thread]) pages[thread] = std::make_unique<SurveyedPage>(file_, survey_);
-        found[i] = pages[thread]->check(survey_.sites[first + i], static_cast<int>(options_.level),
-                                        flips_);
+        found[i] = pages[thread]->check(site, level, flips_);
       });
       // Add what they found, in their order.
-      *report_.pages += count;
+      report_.pages = std::max<std::uint64_t>(report_.pages.value_or(0), first + count);
       for (std::size_t i = 0; i < count; ++i) {
         if (!found[i]) continue;
         survey_.sites[first + i].sound = false;
@@ -288,24 +310,49 @@ class FileCheck {
     if (options_.level >= VerifyLevel::content) report_.points = points;
   }
 
-  /// Checks the tree, excluding damaged pages, and takes over what it counted.
+  /// Checks the tree, excluding damaged pages, and the content of the pages that it leads to. Takes
+  /// over what was counted.
   void check_tree(Progress& progress) {
     // Without its parts a scene has no tree to walk.
     if (survey_.header->has_parts() && survey_.container->parts().empty()) return;
+    CheckedPages checked(*survey_.container);
+    std::optional<CheckedTree> tree;
+    try {
+      tree = walk_tree(checked, progress);
+    } catch (const FormatError&) {  // a page breaks a rule, which check_content() finds
+    }
+    // Check the pages that were not read, and without those that are damaged check the tree again.
+    check_content(checked, progress);
+    if (!tree) tree = walk_tree(checked, progress);
+    static_cast<void>(findings_.append(tree->findings));  // it kept as many as these do
+    if (survey_.container->parts().empty()) count_points();
+    report_.nodes = tree->counts.nodes;
+    report_.groups = tree->counts.groups;
+    report_.levels = tree->counts.levels;
+    report_.tree_checked = tree->counts.complete;
+  }
+
+  CheckedTree walk_tree(CheckedPages& checked, Progress& progress) {
     std::vector<bool> damaged(survey_.container->page_count());
     for (const PageSite& site : survey_.sites) {
       if (!site.sound) damaged[survey_.container->number_of(site.page)] = true;
     }
     progress.begin("check tree", survey_.superblock->points, "points");
-    const CheckedTree tree =
-        verify_tree(*survey_.container, damaged, tree_memory_, findings_, executor_, progress);
+    CheckedTree tree = verify_tree(*survey_.container, damaged, checked, tree_memory_, findings_,
+                                   executor_, progress);
     progress.end();
-    static_cast<void>(findings_.append(tree.findings));  // it kept as many as these do
-    if (survey_.container->parts().empty()) count_points();
-    report_.nodes = tree.counts.nodes;
-    report_.groups = tree.counts.groups;
-    report_.levels = tree.counts.levels;
-    report_.tree_checked = tree.counts.complete;
+    return tree;
+  }
+
+  /// Checks the content of the sound pages that the check of the tree did not read.
+  void check_content(const CheckedPages& checked, Progress& progress) {
+    const auto level_of = [&](const PageSite& site) {
+      return walks_to(site) && site.sound && !checked.passed(site.page)
+                 ? static_cast<int>(VerifyLevel::content)
+                 : 0;
+    };
+    const auto is_left = [&](const PageSite& site) { return level_of(site) > 0; };
+    if (std::ranges::any_of(survey_.sites, is_left)) check_pages(level_of, progress);
   }
 
   /// Counts the points of sound pages.

@@ -123,18 +123,18 @@ class LookAhead {
 class TreeCheck {
  public:
   TreeCheck(const ContainerReader& container, const std::vector<bool>& damaged,
-            const TreeMemory& memory, Findings findings, const Executor& executor,
-            Progress& progress)
+            CheckedPages& checked, const TreeMemory& memory, Findings findings,
+            const Executor& executor, Progress& progress)
       : container_(container),
         reached_(container),
         findings_(std::move(findings)),
-        walk_(container, damaged, memory.cached_pages, reached_, findings_),
+        walk_(container, damaged, checked, memory.cached_pages, reached_, findings_),
         ahead_(container, damaged, walk_.pages()),
         executor_(executor),
         progress_(progress) {
     for (unsigned i = 0; i < memory.walks; ++i)
       below_.push_back(
-          std::make_unique<WalkBelow>(container, damaged, memory.cached_pages, reached_));
+          std::make_unique<WalkBelow>(container, damaged, checked, memory.cached_pages, reached_));
   }
 
   /// Walks through the tree.
@@ -164,8 +164,8 @@ class TreeCheck {
   /// A walk below one group after another, and what it finds.
   struct WalkBelow {
     WalkBelow(const ContainerReader& container, const std::vector<bool>& damaged,
-              std::size_t cached_pages, ReachedGroups& reached)
-        : walk(container, damaged, cached_pages, reached, findings) {}
+              CheckedPages& checked, std::size_t cached_pages, ReachedGroups& reached)
+        : walk(container, damaged, checked, cached_pages, reached, findings) {}
     Findings findings{Subtree::kFindings, false};
     TreeWalk walk;
   };
@@ -237,10 +237,10 @@ TreeMemory TreeMemory::divided(std::uint64_t bytes, const Superblock& superblock
 }
 
 CheckedTree verify_tree(const ContainerReader& container, const std::vector<bool>& damaged,
-                        const TreeMemory& memory, const Findings& before, const Executor& executor,
-                        Progress& progress) {
+                        CheckedPages& checked, const TreeMemory& memory, const Findings& before,
+                        const Executor& executor, Progress& progress) {
   const auto make = [&] {
-    return std::make_unique<TreeCheck>(container, damaged, memory, before.next(), executor,
+    return std::make_unique<TreeCheck>(container, damaged, checked, memory, before.next(), executor,
                                        progress);
   };
   auto check = make();

@@ -8,6 +8,7 @@
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
 #include "engine/store/reader.h"
+#include "engine/verify/checked_pages.h"
 #include "engine/verify/finding.h"
 
 namespace ptc {
@@ -43,12 +44,13 @@ struct TreeMemory {
 /// and the superblock's totals. Whatever lies in or below damaged pages is skipped, and so are the
 /// sums of the nodes above it. What is found does not depend on memory and threads.
 /// @param damaged  by page number, whether the page is damaged
+/// @param checked  remembers the pages that were read
 /// @param before   what was found before; where it stops at the first damage, so does this
-/// @throws std::system_error
+/// @throws FormatError when a page that is not damaged breaks a rule; std::system_error
 /// Memory: one bit for each group, 8 bytes for each page, and what was divided.
 [[nodiscard]] CheckedTree verify_tree(const ContainerReader& container,
-                                      const std::vector<bool>& damaged, const TreeMemory& memory,
-                                      const Findings& before, const Executor& executor,
-                                      Progress& progress);
+                                      const std::vector<bool>& damaged, CheckedPages& checked,
+                                      const TreeMemory& memory, const Findings& before,
+                                      const Executor& executor, Progress& progress);
 
 }  // namespace ptc
