@@ -88,6 +88,15 @@ TEST_CASE("streamed mesh: under a small cap it gives nearly the container of a l
   CHECK(ContainerReader(dir / "other.ptcx").superblock().content_xxh3 ==
         ContainerReader(dir / "small.ptcx").superblock().content_xxh3);
 
+  // Where all is dark, no light is looked for
+  const auto is_lit = [](const BuildReport& report) {
+    return std::ranges::any_of(report.seconds, [](const auto& s) { return s.first == "light"; });
+  };
+  CHECK(is_lit(small));
+  request.lights = LightRig{};
+  CHECK_FALSE(is_lit(build_container(request, dir / "other.ptcx", silent)));
+  CHECK(flux_of(dir / "other.ptcx") == 0);
+
   // A camera sees the surfels where the mesh does not fit, and nearly the same
   const auto render = [&](std::uint64_t bytes, Progress& progress) {
     RenderRequest picture{{.scene = dir / "large.ptcx", .run = {.memory_bytes = bytes}}};

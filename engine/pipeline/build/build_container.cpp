@@ -299,8 +299,8 @@ class Build {
     }
     if (inputs.streamed) {
       progress_.note(
-          "the meshes do not fit in memory: they are sampled from the disk, and lit by rays at the "
-          "surfels");
+          std::string("the meshes do not fit in memory: they are sampled piece by piece") +
+          (inputs.relight ? ", and lit by rays at the surfels" : ""));
       if (inputs.clouds.points > 0 || scene_points() > 0) {
         progress_.note(
             "all other points are lit anew together with them, also those that have light "

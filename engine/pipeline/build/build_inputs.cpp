@@ -328,8 +328,9 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
     inputs.lights = default_rig(up_of(inputs.clouds.text));
   }
   if (inputs.streamed) {
-    // Rays at the surfels light them, once all are in the container
-    inputs.relight = true;
+    // Rays at the surfels light them, once all are in the container, unless all is dark
+    inputs.relight |= inputs.emitters || has_lamps(inputs.lights) || inputs.clouds.points > 0 ||
+                      scene || inputs.lights.sky.radiance != glm::vec3(0);
     inputs.rays_at_emitters = false;
     const StreamedMeshes& streamed = *inputs.streamed;
     inputs.bounds.add(streamed.parts.bounds());
