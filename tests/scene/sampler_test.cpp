@@ -479,3 +479,50 @@ TEST_CASE("sampler: the first of very many surfels are available at once", "[sce
   std::vector<Surfel> first(10);
   CHECK(source->next(first) == 10);
 }
+
+TEST_CASE("sampler: the inside of an open column is left out, shadows in a closed room are not",
+          "[scene][sampler]") {
+  // A column without ends, between a floor and a ceiling, both sides of all reflect
+  Mesh mesh = empty_mesh();
+  add_quad(mesh, {-4, 0, -4}, {0, 0, 8}, {8, 0, 0});
+  add_quad(mesh, {-4, 2, -4}, {8, 0, 0}, {0, 0, 8});
+  const float s = 0.4F;
+  add_quad(mesh, {-s, 0, s}, {2 * s, 0, 0}, {0, 2, 0});
+  add_quad(mesh, {s, 0, s}, {0, 0, -2 * s}, {0, 2, 0});
+  add_quad(mesh, {s, 0, -s}, {-2 * s, 0, 0}, {0, 2, 0});
+  add_quad(mesh, {-s, 0, -s}, {0, 0, 2 * s}, {0, 2, 0});
+  mesh.materials[0].double_sided = true;
+  const auto sampled = [](const Mesh& of, const LightRig& rig) {
+    const RayScene scene(of);
+    const DirectLight light(scene, rig);
+    const ThreadPool executor(2);
+    SamplingOptions options;
+    options.count = 8000;
+    return drain(*sample_mesh(light, scene, options, executor));
+  };
+  LightRig sky;
+  sky.sky.radiance = glm::vec3(1);
+  std::size_t inside = 0, outside = 0;
+  for (const Surfel& surfel : sampled(mesh, sky)) {
+    const glm::vec3 p(surfel.position);
+    if (std::abs(p.x) > 0.42F || std::abs(p.z) > 0.42F || p.y < 0.1F || p.y > 1.9F) continue;
+    (glm::dot(surfel.normal, glm::vec3(p.x, 0, p.z)) < 0 ? inside : outside) += 1;
+  }
+  CHECK(outside > 80);
+  CHECK(inside == 0);
+
+  // A box that looks outwards with a lamp and a table in it: what the lamp does not see stays
+  Mesh room = empty_mesh();
+  add_box(room, glm::vec3(0), glm::vec3(4), false);
+  add_quad(room, {1, 1, 1}, {0, 0, 2}, {2, 0, 0});
+  room.materials[0].double_sided = true;
+  LightRig lamp;
+  lamp.points.push_back({.position = {2, 3.9, 2}});
+  std::size_t under = 0;
+  for (const Surfel& surfel : sampled(room, lamp)) {
+    const glm::dvec3& p = surfel.position;
+    const bool shaded = surfel.radiance == glm::vec3(0) && p.y < 0.5 && surfel.normal.y > 0.9F;
+    under += shaded && p.x > 1.2 && p.x < 2.8 && p.z > 1.2 && p.z < 2.8 ? 1 : 0;
+  }
+  CHECK(under > 30);
+}

@@ -463,10 +463,13 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
   }
   double spacing = 0;
   if (const LitMesh* lit = inputs.lit.get()) {
-    spacing = request.sampling.spacing > 0 ? request.sampling.spacing
-                                           : spacing_for(lit->mesh, request.sampling.count);
     SamplingOptions sampling = request.sampling;
     if (!inputs.rays_at_emitters) sampling.lights.area_rays = 0;
+    if (sampling.spacing == 0) {
+      sampling =
+          with_spacing(sampling, seen_area(lit->light, lit->rays, sampling.lights, executor));
+    }
+    spacing = sampling.spacing;
     feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor, room.at_once));
   }
   inputs.lit.reset();

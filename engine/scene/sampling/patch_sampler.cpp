@@ -7,15 +7,17 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/base/basis.h"
+#include "engine/base/low_discrepancy.h"
 #include "engine/base/numbers.h"
+#include "engine/scene/sampling/directions.h"
 #include "engine/scene/sampling/surroundings.h"
 #include "engine/scene/step_off.h"
 
 namespace ptc {
 namespace {
 
-constexpr unsigned kRounds = 6;     // of Lloyd's method
-constexpr unsigned kLitPoints = 4;  // points of a surfel that light is traced from, evenly spread
+constexpr unsigned kRounds = 6;  // of Lloyd's method
 // Where both sides of a surface count, their surfels are kept apart: a back that lay at the place
 // of a front would hide it. Their radii differ, so that clusters of them have a mean normal.
 constexpr float kHalfGap = 0.02F;     // from the surface to each of them, radii
@@ -24,7 +26,7 @@ constexpr double kMinNormal = 0.1;    // least length of a mean normal that is u
 
 // Returns the rays of one lit point, of those that a surfel has; rounded up.
 unsigned share(unsigned rays) {
-  return (rays + kLitPoints - 1) / kLitPoints;
+  return (rays + PatchSampler::kLitPoints - 1) / PatchSampler::kLitPoints;
 }
 
 glm::vec3 finite_or_black(const glm::vec3& c) {
@@ -141,7 +143,7 @@ std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
   if (light_ == nullptr) return glm::vec3(0);
   const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
   glm::vec3 sum(0);
-  float lit = 0;
+  float lit = 0, dark = 0;  // points
   for (std::size_t i = 0; i < count; ++i) {
     const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
     const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
@@ -155,14 +157,74 @@ std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
           light_->irradiance(at.position, *origin, side * at.normal, lit_point_, own_seed);
       arrives = direct.local + direct.sky;
     }
-    if (arrives == glm::vec3(0) && is_buried(scene_, *origin, side * at.geometric_normal, own_seed))
-      continue;
-    if (light_->is_black()) return glm::vec3(0);
+    if (arrives == glm::vec3(0)) {
+      const glm::vec3 upwards = side * at.geometric_normal;
+      if (is_buried(scene_, *origin, upwards, own_seed)) continue;
+      if (light_->is_black()) return glm::vec3(0);
+      if (sides_of(scene_.mesh(), point.triangle) == 2 &&
+          is_left_dark(*origin, upwards, own_seed)) {
+        dark += 1;
+        continue;
+      }
+    }
     sum += finite_or_black(at.albedo / kPi * arrives);
     lit += 1;
   }
   if (lit == 0) return {};
-  return sum / lit;
+  return sum / (lit + dark);
+}
+
+// Says whether light is unlikely to reach a place by way of other surfaces: a few paths find
+// neither the sky nor a place that is lit. So it is inside a column whose sides are all
+// double-sided, and which stands open on a floor.
+// @param origin  as step_off() returns it
+// @param normal  unit, on the side that is asked about
+bool PatchSampler::is_left_dark(const glm::dvec3& origin, const glm::vec3& normal,
+                                std::uint64_t seed) const {
+  constexpr std::uint32_t kPaths = 4, kSegments = 4;
+  constexpr LightSampling kOneRay{.sun_rays = 1, .area_rays = 1, .sky_rays = 1};
+  const Mesh& mesh = scene_.mesh();
+  for (std::uint32_t path = 0; path < kPaths; ++path) {
+    glm::dvec3 from = origin;
+    glm::vec3 upwards = normal;
+    for (std::uint32_t segment = 0; segment < kSegments; ++segment) {
+      const std::uint64_t own_seed = splitmix64(seed ^ (path * kSegments + segment + 1));
+      const glm::vec3 direction =
+          Basis(upwards).to_world(cosine_direction(SquarePoints(own_seed).square(0)));
+      const auto hit = scene_.closest(from, direction, 0, std::numeric_limits<double>::infinity());
+      if (!hit || (hit->front && hit->emission != glm::vec3(0))) return false;
+      if (!hit->front && !mesh.materials[mesh.material_of[hit->triangle]].double_sided) break;
+      const auto next = step_off(scene_, *hit, hit->front);
+      if (!next) break;
+      from = *next;
+      upwards = hit->front ? hit->geometric_normal : -hit->geometric_normal;
+      const DirectLight::Result direct =
+          light_->irradiance(hit->position, from, upwards, kOneRay, own_seed);
+      if (direct.local + direct.sky != glm::vec3(0)) return false;
+    }
+  }
+  return true;
+}
+
+bool PatchSampler::is_sunk(const SurfacePoint& point, std::uint64_t seed) const {
+  const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
+  const auto origin = step_off(scene_, at, true);
+  return !origin || is_buried(scene_, *origin, at.geometric_normal, seed);
+}
+
+bool PatchSampler::is_seen(const SurfaceHit& at, bool front, std::uint64_t seed) const {
+  const auto origin = step_off(scene_, at, front);
+  if (!origin) return false;
+  const float side = front ? 1 : -1;
+  if (!light_->is_black()) {
+    const DirectLight::Result direct =
+        light_->irradiance(at.position, *origin, side * at.normal, lit_point_, seed);
+    if (direct.local + direct.sky != glm::vec3(0)) return true;
+  }
+  const glm::vec3 upwards = side * at.geometric_normal;
+  if (is_buried(scene_, *origin, upwards, seed)) return false;
+  return light_->is_black() || sides_of(scene_.mesh(), at.triangle) == 1 ||
+         !is_left_dark(*origin, upwards, seed);
 }
 
 std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {
@@ -180,9 +242,12 @@ std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {
     const SurfacePoint& nearest = patch.points[group.nearest];
     const double sides = sides_of(scene_.mesh(), nearest.triangle);
     covered += group.area * sides;
-    const auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
+    auto front = reflected(group, patch.points, 1, 2 * (patch.first + i));
     const auto back =
         sides == 1 ? std::nullopt : reflected(group, patch.points, -1, 2 * (patch.first + i) + 1);
+    // A wall between two dark places still keeps light out
+    if (sides == 2 && !front && !back && !is_sunk(nearest, 2 * (patch.first + i)))
+      front = glm::vec3(0);
     if (!front && !back) continue;
     Surfel surfel = place(group, nearest, clusters[i]);
     const bool both = front && back;

@@ -31,13 +31,17 @@ namespace ptc {
 ///
 /// The points measure a group: its area, mean normal, albedo and emission. The surfel lies at the
 /// middle of its group; the light is traced from 4 of the points, which share the surfel's rays.
-/// How far it must move from an edge is looked for only where no groups lie around it.
+/// How far it must move from an edge is looked for only where no groups lie around it. A side of a
+/// double-sided material that no light reaches, not even by way of other surfaces, counts as
+/// buried.
 ///
 /// Threads: sample() may be called concurrently.
 class PatchSampler {
  public:
   /// Points of a patch for each surfel.
   static constexpr unsigned kPointsPerSurfel = 16;
+  /// Points of a surfel that light is traced from, evenly spread.
+  static constexpr unsigned kLitPoints = 4;
 
   /// @param scene  has the patch and all that lies around it; must outlive this
   /// @param light  of that scene, must outlive this; null: surfels reflect nothing, and none counts
@@ -50,6 +54,11 @@ class PatchSampler {
   /// @param patch  has kPointsPerSurfel points for each surfel
   [[nodiscard]] std::vector<Surfel> sample(const SurfacePatch& patch) const;
 
+  /// Says whether a side of a place on the surface is likely to get a surfel: whether light reaches
+  /// it, or it is not buried.
+  /// @pre there is a light
+  [[nodiscard]] bool is_seen(const SurfaceHit& at, bool front, std::uint64_t seed) const;
+
  private:
   struct Group;
   // Sums up the points of each cluster.
@@ -61,6 +70,10 @@ class PatchSampler {
   [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group,
                                                    std::span<const SurfacePoint> points, float side,
                                                    std::uint64_t seed) const;
+  /// Says whether a point lies inside a solid.
+  [[nodiscard]] bool is_sunk(const SurfacePoint& point, std::uint64_t seed) const;
+  [[nodiscard]] bool is_left_dark(const glm::dvec3& origin, const glm::vec3& normal,
+                                  std::uint64_t seed) const;
 
   const RayScene& scene_;
   const DirectLight* light_;

@@ -3,9 +3,12 @@
 #include "engine/scene/sampling/sampler.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <vector>
 
 #include "engine/base/error.h"
+#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/patch_sampler.h"
 #include "engine/scene/sampling/patch_stream.h"
 #include "engine/scene/sampling/spacing_field.h"
@@ -24,7 +27,9 @@ class MeshSource final : public PatchStream {
              const Executor& executor, unsigned at_once)
       : PatchStream(executor, at_once),
         sampler_(scene, &light, options.lights),
-        field_(with_spacing(options, sampled_area(scene.mesh()))),
+        field_(with_spacing(options, options.spacing > 0
+                                         ? sampled_area(scene.mesh())
+                                         : seen_area(light, scene, options.lights, executor))),
         patches_(scene.mesh(), field_, kPatchSurfels) {}
 
  private:
@@ -94,6 +99,46 @@ std::unique_ptr<PointSource> sample_mesh(const DirectLight& light, const RayScen
                                          const SamplingOptions& options, const Executor& executor,
                                          unsigned at_once) {
   return std::make_unique<MeshSource>(light, scene, options, executor, at_once);
+}
+
+double seen_area(const DirectLight& light, const RayScene& scene, const LightSampling& rays,
+                 const Executor& executor) {
+  const Mesh& mesh = scene.mesh();
+  const double area = sampled_area(mesh);
+  const bool two_sided = std::ranges::any_of(mesh.materials, &Material::double_sided);
+  if (!two_sided || !(area > 0)) return area;
+  // Look at places at equal steps of the area of double-sided materials
+  constexpr std::uint32_t kPlaces = 4096;
+  std::vector<double> reached(mesh.triangles.size());  // sums of it, up to and with each triangle
+  double sum = 0;
+  for (std::uint32_t i = 0; i < reached.size(); ++i) {
+    if (sides_of(mesh, i) == 2) sum += whole_triangle(mesh, i).area();
+    reached[i] = sum;
+  }
+  if (!(sum > 0)) return area;
+  const PatchSampler sampler(scene, &light, rays);
+  const SquarePoints places(0);
+  std::atomic<std::uint32_t> hidden = 0;  // sides
+  executor.for_each(kPlaces, [&](std::size_t i, unsigned) {
+    const double wanted = sum * (static_cast<double>(i) + 0.5) / kPlaces;
+    const auto found = std::ranges::lower_bound(reached, wanted);
+    const auto triangle = static_cast<std::uint32_t>(found - reached.begin());
+    const glm::vec2 square = places.square(static_cast<std::uint32_t>(i));
+    const float u = std::sqrt(square.x);  // uniform over the triangle
+    const SurfaceHit at = scene.surface(triangle, u * (1 - square.y), u * square.y);
+    // A side is looked at as often as a surfel has points; of two dark ones the front stays
+    unsigned dark = 0;
+    for (const bool front : {true, false}) {
+      bool seen = false;
+      for (unsigned k = 0; k < PatchSampler::kLitPoints && !seen; ++k)
+        seen = sampler.is_seen(at, front, 8 * i + 2 * k + (front ? 1 : 0));
+      dark += seen ? 0 : 1;
+    }
+    hidden += std::min(dark, 1U);
+  });
+  constexpr double kLeast = 0.05;  // of the area: more would be finer than anyone asks for
+  const double share = static_cast<double>(hidden) / (2.0 * kPlaces);
+  return std::max(kLeast * area, area - share * 2 * sum);
 }
 
 }  // namespace ptc
