@@ -80,7 +80,7 @@ void JsonFields::finish() const {
 Json parse_json(const std::string& text, const std::string& where) {
   constexpr int kMaxDepth = 64;  // of arrays and objects in each other
   const auto check_depth = [&](int depth, Json::parse_event_t, const Json&) {
-    if (depth > kMaxDepth) throw DataError(where + " is nested more than 64 deep");
+    if (depth > kMaxDepth) throw DataError(where + ": its JSON is nested more than 64 deep");
     return true;
   };
   try {

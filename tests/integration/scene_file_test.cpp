@@ -203,6 +203,25 @@ TEST_CASE("scene file: lights and records of what is placed move with it", "[int
                       glm::dvec3(100, 7, 3)) < 1e-6);
 }
 
+TEST_CASE("scene file: objects that differ in their places alone are read once",
+          "[integration][scene]") {
+  Scene scene;
+  const std::filesystem::path file = scene.dir.file("a.scene.json", R"({"ptcx_scene": 1,
+    "materials": {"red": {}}, "objects": [
+    {"file": "square.obj"}, {"file": "square.obj", "material": "red"},
+    {"file": "square.obj", "translate": [5, 0, 0]},
+    {"file": "square.obj", "placements": [{"translate": [9, 0, 0]}, {}]},
+    {"file": "square.obj", "one_sided": true}]})");
+  const SceneObjects scene_of = read_scene_objects({file}, nullptr, 1 << 20);
+  REQUIRE(scene_of.objects.size() == 3);
+  std::vector<double> x;
+  for (const Placement& place : scene_of.objects[0].places) x.push_back(place[3].x);
+  CHECK(x == std::vector<double>{0, 5, 9, 0});
+  CHECK(scene_of.objects[1].material);
+  CHECK(scene_of.objects[1].places.empty());
+  CHECK(scene_of.objects[2].one_sided);
+}
+
 TEST_CASE("scene file: more places than memory holds are refused before they are taken",
           "[integration][scene]") {
   Scene scene;
@@ -212,7 +231,7 @@ TEST_CASE("scene file: more places than memory holds are refused before they are
   const std::filesystem::path file = scene.dir.file(
       "a.scene.json",
       R"({"ptcx_scene": 1, "objects": [{"file": "square.obj", "placements": "p.txt"}]})");
-  CHECK(read_scene_objects({file}, nullptr, 20000 * 3 * sizeof(Placement)).objects.size() == 1);
+  CHECK(read_scene_objects({file}, nullptr, 20001 * 3 * sizeof(Placement)).objects.size() == 1);
   CHECK_THROWS_AS(read_scene_objects({file}, nullptr, 16384 * 3 * sizeof(Placement) - 1),
                   LimitError);
   CHECK_THROWS_AS(read_scene_objects({file}, nullptr, 1000), LimitError);  // for the JSON
@@ -259,7 +278,7 @@ TEST_CASE("scene file: what is wrong is named", "[integration][scene]") {
              Contains("a scene file cannot hold another one"));
   CHECK_THAT(scene.fault(R"({"ptcx_scene": 1, "lights": )" + std::string(100'000, '[') +
                          std::string(100'000, ']') + "}"),
-             Contains("a.scene.json is nested more than 64 deep"));
+             Contains("a.scene.json: its JSON is nested more than 64 deep"));
   scene.dir.file("p.txt", "# none\n");
   CHECK_THAT(object(R"("placements": "p.txt")"), Contains("holds no place"));
 }

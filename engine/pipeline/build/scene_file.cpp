@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -257,8 +258,23 @@ class SceneReader {
       }
     }
     fields.finish();
-    places_ += object.places.size();
-    scene_.objects.push_back(std::move(object));
+    check_places(places_ += object.places.size() + 1, memory_bytes_, where);
+    add(std::move(object), material);
+  }
+
+  /// Adds an object, or its places to those of one that differs in nothing else, so that a file
+  /// that many objects name is read once.
+  void add(SceneObject object, const std::string& material) {
+    const auto [at, is_new] = known_.try_emplace(
+        std::tuple(object.file, material, object.one_sided), scene_.objects.size());
+    if (is_new) {
+      scene_.objects.push_back(std::move(object));
+      return;
+    }
+    std::vector<Placement>& places = scene_.objects[at->second].places;
+    if (places.empty()) places.emplace_back(1);
+    if (object.places.empty()) object.places.emplace_back(1);
+    places.insert(places.end(), object.places.begin(), object.places.end());
   }
 
   /// Reads a place; nothing where no member gives one.
@@ -316,6 +332,8 @@ class SceneReader {
   SceneObjects& scene_;
   std::uint64_t places_ = 0;  ///< of all objects so far
   std::map<std::string, Material> materials_;
+  /// Index of an object by its file, the name of its material, and whether it is one-sided.
+  std::map<std::tuple<std::filesystem::path, std::string, bool>, std::size_t> known_;
 };
 
 }  // namespace

@@ -23,8 +23,9 @@ struct SceneObject {
 
 /// The content of scene files, and of other files beside them.
 struct SceneObjects {
-  std::vector<SceneObject> objects;  ///< in the order of the files
-  std::optional<LightRig> lights;    ///< of the first file that has any; its sky's map is not read
+  /// In the order of the files; those of a scene file that differ in their places alone are one.
+  std::vector<SceneObject> objects;
+  std::optional<LightRig> lights;  ///< of the first file that has any; its sky's map is not read
   std::vector<std::filesystem::path> named;  ///< all files that scene files name
   std::vector<MeshCamera> cameras;           ///< of all files
 };
