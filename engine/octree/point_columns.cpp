@@ -253,7 +253,7 @@ NodeSummary summarise(const PointColumns& points, std::size_t begin, std::size_t
                                       value(PointColumns::kGreen, i),
                                       value(PointColumns::kBlue, i)};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      // Of the two directions of an axis, a normal faces one.
+      // A normal faces one of the two directions of each axis.
       std::array<double, 4>& sums = towards[2 * axis + (normal[axis] > 0 ? 0 : 1)];
       const double facing = area * std::abs(normal[axis]);
       for (std::size_t c = 0; c < 4; ++c) sums[c] += facing * light[c];

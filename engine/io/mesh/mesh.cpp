@@ -181,6 +181,12 @@ bool is_placement(const Placement& place) {
   return determinant != 0 && std::isfinite(determinant);
 }
 
+glm::vec3 turned(const glm::vec3& direction, const Placement& place) {
+  const glm::dvec3 moved = glm::dmat3(place) * glm::dvec3(direction);
+  const double length = glm::length(moved);
+  return length > 0 ? glm::vec3(moved / length) : direction;
+}
+
 void place_mesh(Mesh& mesh, const Placement& place) {
   const glm::dmat4 transform(place);
   transform_positions(mesh, transform, rounded_centre(transformed_bounds(mesh, transform)));

@@ -179,6 +179,8 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform,
 
 /// Returns whether a placement is finite and can be inverted.
 [[nodiscard]] bool is_placement(const Placement& place);
+/// Returns a unit direction that turns with a place; one that the place makes 0 stays.
+[[nodiscard]] glm::vec3 turned(const glm::vec3& direction, const Placement& place);
 /// Transforms a mesh in its place, as append_mesh() does with a copy. @pre is_placement(place)
 void place_mesh(Mesh& mesh, const Placement& place);
 

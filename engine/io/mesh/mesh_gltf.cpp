@@ -6,11 +6,11 @@
 //             mesh --> primitive --> accessors (positions, normals, texture coordinates, indices)
 //                          `--> material --> texture --> image
 //
-// GltfDocument follows the arrows and checks each index. GltfMesh walks the nodes of the default
-// scene and notes where meshes stand. Then it appends every primitive to one MeshSoup, in which all
-// vertices have normals and texture coordinates of the same index: a mesh that stands in two places
-// is there twice. Where that would not fit in memory, such a mesh gets a soup of its own, once, and
-// keeps its places.
+// GltfDocument follows the arrows and checks each index. walk_gltf_nodes() walks the nodes of the
+// default scene and notes where meshes stand. GltfMesh appends every primitive to one MeshSoup, in
+// which all vertices have normals and texture coordinates of the same index: a mesh that stands in
+// two places is there twice. Where that would not fit in memory, such a mesh gets a soup of its
+// own, once, and keeps its places.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,13 +19,13 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/mesh/gltf_document.h"
 #include "engine/io/mesh/gltf_materials.h"
+#include "engine/io/mesh/gltf_nodes.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -61,19 +61,6 @@ const Extension* find_extension(std::string_view name) {
   return found == kExtensions.end() ? nullptr : found;
 }
 
-constexpr char kLights[] = "KHR_lights_punctual";
-constexpr char kInstancing[] = "EXT_mesh_gpu_instancing";
-
-// Returns the matrix of a translation, a rotation (x, y, z, w) and a scale, applied from the last
-// to the first.
-glm::dmat4 matrix_of(std::span<const double> t, std::span<const double> r,
-                     std::span<const double> s) {
-  glm::dmat4 matrix = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
-  for (int i = 0; i < 3; ++i) matrix[i] *= s[static_cast<std::size_t>(i)];
-  matrix[3] = {t[0], t[1], t[2], 1};
-  return matrix;
-}
-
 class GltfMesh {
  public:
   GltfMesh(const std::filesystem::path& path, const MeshRoom& room)
@@ -88,8 +75,8 @@ class GltfMesh {
 
   MeshFile read() {
     check_extensions();
-    visited_.resize(document_.count("nodes"));
-    walk_nodes();
+    GltfNodes nodes = walk_gltf_nodes(document_, room_.memory_bytes, warnings_);
+    uses_ = std::move(nodes.uses);
     std::vector<PlacedMesh> placed;
     if (!copies_fit()) placed = read_placed();
     begin_soup();
@@ -103,19 +90,13 @@ class GltfMesh {
     if (file.mesh.triangles.empty() && !file.spilled && placed.empty())
       document_.fail("the mesh has no triangle");
     file.placed = std::move(placed);
-    file.cameras = std::move(cameras_);
+    file.cameras = std::move(nodes.cameras);
     file.warnings = warnings_.lines();
-    file.lights = std::move(lights_);
+    file.lights = std::move(nodes.lights);
     return file;
   }
 
  private:
-  // A mesh, by its index, in one place.
-  struct Use {
-    std::uint64_t mesh;
-    Placement place;
-  };
-
   // Begins a list of polygons with what is left of the memory.
   void begin_soup() {
     soup_ = MeshSoup(document_.path(), room_);
@@ -155,7 +136,7 @@ class GltfMesh {
   // Says whether a copy of each mesh for each of its places fits in memory, or makes no difference.
   bool copies_fit() {
     std::map<std::uint64_t, std::uint64_t> all;  // uses of a mesh, by its index
-    for (const Use& use : uses_) {
+    for (const GltfUse& use : uses_) {
       ++all[use.mesh];
       if (is_placement(use.place)) ++times_[use.mesh];
     }
@@ -202,7 +183,7 @@ class GltfMesh {
       room_.memory_bytes -= std::min(room_.memory_bytes, 4 * bytes_of(file.mesh));
       made.mesh = std::make_shared<const Mesh>(std::move(file.mesh));
     }
-    std::erase_if(uses_, [&](const Use& use) {
+    std::erase_if(uses_, [&](const GltfUse& use) {
       if (empty.contains(use.mesh)) return true;
       const auto at = index_of.find(use.mesh);
       if (at == index_of.end() || !is_placement(use.place)) return false;
@@ -210,56 +191,6 @@ class GltfMesh {
       return true;
     });
     return placed;
-  }
-
-  // Notes that a mesh stands in a place.
-  void add_use(std::uint64_t mesh, const glm::dmat4& world) {
-    uses_.push_back({mesh, Placement(world)});
-    constexpr std::size_t kUsesBetweenChecks = 1 << 12;
-    if (uses_.size() % kUsesBetweenChecks == 0) check_uses(uses_.size());
-  }
-
-  // Checks that so many places fit in memory, twice: here and in what comes of it.
-  void check_uses(std::uint64_t count) const {
-    if (count <= room_.memory_bytes / (2 * (sizeof(Use) + sizeof(Placement)))) return;
-    throw LimitError(document_.path().string() + ": its " + std::to_string(count) +
-                     " instances take more memory than there is: raise the cap");
-  }
-
-  // Notes the instances of a node. Source: Khronos, EXT_mesh_gpu_instancing.
-  void add_instances(std::uint64_t mesh, const Json& instancing, const glm::dmat4& world) {
-    const Json* const attributes = GltfDocument::member(instancing, "attributes");
-    if (attributes == nullptr) document_.fail("the instances of a node have no attributes");
-    std::optional<std::uint64_t> count;
-    const auto find = [&](const char* key, std::size_t components) {
-      const auto accessor = document_.unsigned_at(*attributes, key);
-      if (!accessor) return GltfDocument::Elements{};
-      const GltfDocument::Elements found = document_.find_elements(*accessor, components, count);
-      count = found.count;
-      check_uses(uses_.size() + found.count);
-      return found;
-    };
-    const GltfDocument::Elements translations = find("TRANSLATION", 3);
-    const GltfDocument::Elements rotations = find("ROTATION", 4);
-    const GltfDocument::Elements scales = find("SCALE", 3);
-    if (!count) return add_use(mesh, world);
-    struct Parts {
-      std::array<double, 3> t{0, 0, 0};
-      std::array<double, 4> r{0, 0, 0, 1};
-      std::array<double, 3> s{1, 1, 1};
-    };
-    std::vector<Parts> parts(*count);
-    const auto read = [&](const GltfDocument::Elements& from, auto member) {
-      if (from.components == 0) return;
-      std::size_t at = 0;
-      document_.read(from, [&](std::span<const double> numbers) {
-        std::ranges::copy(numbers, (parts[at++].*member).begin());
-      });
-    };
-    read(translations, &Parts::t);
-    read(rotations, &Parts::r);
-    read(scales, &Parts::s);
-    for (const Parts& p : parts) add_use(mesh, world * matrix_of(p.t, p.r, p.s));
   }
 
   void check_extensions() const {
@@ -281,82 +212,6 @@ class GltfMesh {
       const Extension* const known = find_extension(name);
       if (known == nullptr || !known->understood) warnings_.add(kExtensionLeftOut, name);
     }
-  }
-
-  // Returns the nodes of the default scene or, in a file without scenes, those without a parent.
-  std::vector<std::uint64_t> root_nodes() const {
-    if (document_.count("scenes") > 0) {
-      const std::uint64_t scene = document_.unsigned_at(document_.root(), "scene").value_or(0);
-      return node_list(document_.at("scenes", scene), "nodes");
-    }
-    std::vector<bool> child(document_.count("nodes"));
-    for (std::size_t i = 0; i < child.size(); ++i) {
-      for (const std::uint64_t c : node_list(document_.at("nodes", i), "children")) {
-        if (c < child.size()) child[c] = true;
-      }
-    }
-    std::vector<std::uint64_t> roots;
-    for (std::size_t i = 0; i < child.size(); ++i) {
-      if (!child[i]) roots.push_back(i);
-    }
-    return roots;
-  }
-
-  std::vector<std::uint64_t> node_list(const Json& object, const char* key) const {
-    const auto found = object.find(key);
-    if (found == object.end()) return {};
-    if (!found->is_array()) document_.fail(std::string(key) + " is not an array");
-    std::vector<std::uint64_t> nodes;
-    for (const Json& index : *found) {
-      if (!index.is_number_unsigned())
-        document_.fail(std::string(key) + " holds a value that is not an index");
-      nodes.push_back(index.get<std::uint64_t>());
-    }
-    return nodes;
-  }
-
-  // Notes the meshes, cameras and lights of all nodes, parents before their children.
-  void walk_nodes() {
-    std::vector<std::pair<std::uint64_t, glm::dmat4>> open;
-    const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent) {
-      std::ranges::reverse(nodes);  // the last one pushed is the next one read
-      for (const std::uint64_t node : nodes) open.emplace_back(node, parent);
-    };
-    push(root_nodes(), glm::dmat4(1));
-    while (!open.empty()) {
-      const auto [index, parent] = open.back();
-      open.pop_back();
-      const Json& node = document_.at("nodes", index);
-      if (visited_[index]) {
-        document_.fail("node " + std::to_string(index) + " has two parents or contains itself");
-      }
-      visited_[index] = true;
-      const glm::dmat4 world = parent * local_transform(node);
-      if (const auto mesh = document_.unsigned_at(node, "mesh")) {
-        if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
-          add_instances(*mesh, *instancing, world);
-        } else {
-          add_use(*mesh, world);
-        }
-      }
-      if (const auto camera = document_.unsigned_at(node, "camera")) add_camera(*camera, world);
-      if (const Json* const light = GltfDocument::extension(node, kLights))
-        add_light(*light, world);
-      push(node_list(node, "children"), world);
-    }
-  }
-
-  glm::dmat4 local_transform(const Json& node) const {
-    if (const auto m = document_.numbers_at<16>(node, "matrix")) {
-      glm::dmat4 matrix;
-      for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = (*m)[static_cast<std::size_t>(i)];
-      return matrix;
-    }
-    const auto t = document_.numbers_at<3>(node, "translation").value_or(std::array{0.0, 0.0, 0.0});
-    const auto r =
-        document_.numbers_at<4>(node, "rotation").value_or(std::array{0.0, 0.0, 0.0, 1.0});
-    const auto s = document_.numbers_at<3>(node, "scale").value_or(std::array{1.0, 1.0, 1.0});
-    return matrix_of(t, r, s);
   }
 
   void add_mesh(std::uint64_t index, const glm::dmat4& world) {
@@ -500,87 +355,15 @@ class GltfMesh {
     });
   }
 
-  // Adds a perspective camera, which looks along -z with y up (section 3.10).
-  void add_camera(std::uint64_t index, const glm::dmat4& world) {
-    const Json* const perspective =
-        GltfDocument::member(document_.at("cameras", index), "perspective");
-    if (perspective == nullptr) return;
-    const double vertical = document_.number_at(*perspective, "yfov", 0.7);
-    const double aspect = document_.number_at(*perspective, "aspectRatio", 16.0 / 9);
-    const auto camera =
-        make_camera(glm::dvec3(world[3]), -glm::dvec3(world[2]), glm::dvec3(world[1]),
-                    2 * std::atan(std::tan(vertical / 2) * aspect));
-    if (camera) {
-      cameras_.push_back(*camera);
-    } else if (cameras_left_out_.insert(index).second) {
-      warnings_.add(kCameraLeftOut, "camera " + std::to_string(index));
-    }
-  }
-
-  // Adds a light, which shines along -z. Its range is left out, since light has no end.
-  // Source: Khronos, KHR_lights_punctual.
-  void add_light(const Json& of_node, const glm::dmat4& world) {
-    const Json* const all = GltfDocument::extension(document_.root(), kLights);
-    const auto index = document_.unsigned_at(of_node, "light");
-    const auto list = all == nullptr ? Json::const_iterator() : all->find("lights");
-    if (!index || all == nullptr || list == all->end() || !list->is_array() ||
-        *index >= list->size() || !(*list)[*index].is_object()) {
-      document_.fail("a node shows a light that does not exist");
-    }
-    const Json& json = (*list)[*index];
-    const auto type = json.find("type");
-    MeshLight light{.position = glm::dvec3(world[3])};
-    if (type != json.end() && *type == "directional") {
-      light.kind = MeshLight::Kind::sun;
-    } else if (type != json.end() && *type == "spot") {
-      light.kind = MeshLight::Kind::spot;
-      set_cone(json, light);
-    } else if (type == json.end() || *type != "point") {
-      document_.fail("a light is neither directional, point nor spot");
-    }
-    const auto colour = document_.numbers_at<3>(json, "color").value_or(std::array{1.0, 1.0, 1.0});
-    const double intensity = document_.number_at(json, "intensity", 1);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const double value = colour[i] * intensity;
-      light.intensity[static_cast<int>(i)] =
-          static_cast<float>(std::clamp<double>(value, 0, std::numeric_limits<float>::max()));
-    }
-    const glm::dvec3 axis = -glm::dvec3(world[2]);
-    const double length = glm::length(axis);
-    const bool aims = std::isfinite(length) && length > 0;
-    const glm::dvec3& p = light.position;
-    if (!std::isfinite(p.x + p.y + p.z) || (!aims && light.kind != MeshLight::Kind::point)) {
-      warnings_.add(kLightLeftOut, "light " + std::to_string(*index));
-      return;
-    }
-    if (aims) light.direction = glm::vec3(axis / length);
-    lights_.push_back(light);
-  }
-
-  void set_cone(const Json& json, MeshLight& light) const {
-    const auto spot = json.find("spot");
-    if (spot == json.end() || !spot->is_object()) return;
-    constexpr double kLeast = 1e-4, kMost = 1.5707963;
-    const double outer =
-        std::clamp(document_.number_at(*spot, "outerConeAngle", 0.7853981633974483), kLeast, kMost);
-    light.outer_angle = static_cast<float>(outer);
-    light.inner_angle =
-        static_cast<float>(std::clamp(document_.number_at(*spot, "innerConeAngle", 0), 0.0, outer));
-  }
-
   GltfDocument document_;
   MeshRoom room_;  // what is left of it
   MeshSoup soup_;  // of the meshes that are read together
-  std::vector<Use> uses_;
+  std::vector<GltfUse> uses_;
   std::map<std::uint64_t, std::uint64_t> times_;  // places of a mesh that can be inverted
-  std::vector<MeshCamera> cameras_;
-  std::vector<MeshLight> lights_;
   MeshWarnings warnings_;
   TextureLoader textures_;
   GltfMaterials materials_;
-  std::set<std::uint64_t> cameras_left_out_;  // indices in the file
-  std::vector<bool> visited_;                 // per node
-  bool has_uvs_ = false;                      // some primitive in the soup has texture coordinates
+  bool has_uvs_ = false;  // some primitive in the soup has texture coordinates
 };
 
 }  // namespace

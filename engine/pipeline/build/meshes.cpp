@@ -7,7 +7,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
 #include "engine/base/surfel.h"
@@ -56,13 +55,6 @@ void add_backdrop(Mesh& mesh, const Bounds& bounds, const char* field) {
   add_box(mesh, {wall - 0.05 * size, floor, middle.z - 0.8 * size},
           {wall, floor + 0.9 * size, middle.z + 0.8 * size},
           {.name = "wall", .albedo = glm::vec3(0.65F, 0.07F, 0.05F)}, field);
-}
-
-/// Returns a unit direction that is turned with a place.
-glm::vec3 turned(const glm::vec3& direction, const Placement& place) {
-  const glm::dvec3 moved = glm::dmat3(place) * glm::dvec3(direction);
-  const double length = glm::length(moved);
-  return length > 0 ? glm::vec3(moved / length) : direction;
 }
 
 MeshLight placed_at(MeshLight light, const Placement& place) {

@@ -109,9 +109,14 @@ std::vector<Placement> read_places(const std::filesystem::path& path, std::uint6
 /// Reads one scene file.
 class SceneReader {
  public:
-  SceneReader(const std::filesystem::path& path, TextureStore* textures, std::uint64_t memory_bytes,
-              SceneObjects& scene)
-      : path_(path), textures_(textures), memory_bytes_(memory_bytes), scene_(scene) {}
+  /// @param places  whether files of places are read
+  SceneReader(const std::filesystem::path& path, TextureStore* textures, bool places,
+              std::uint64_t memory_bytes, SceneObjects& scene)
+      : path_(path),
+        textures_(textures),
+        reads_places_(places),
+        memory_bytes_(memory_bytes),
+        scene_(scene) {}
 
   void read() {
     const InputFile file(path_);
@@ -244,8 +249,8 @@ class SceneReader {
     if (placements == nullptr) {
       if (const auto place = read_place(fields)) object.places.push_back(*place);
     } else if (placements->is_string()) {
-      object.places =
-          read_places(resolved(placements->get<std::string>(), fields), places_, memory_bytes_);
+      const std::filesystem::path path = resolved(placements->get<std::string>(), fields);
+      if (reads_places_) object.places = read_places(path, places_, memory_bytes_);
     } else if (!placements->is_array() || placements->empty()) {
       fields.fail("placements must be an array of places, or the name of a file");
     } else {
@@ -328,6 +333,7 @@ class SceneReader {
 
   const std::filesystem::path& path_;
   TextureStore* textures_;
+  bool reads_places_;
   std::uint64_t memory_bytes_;
   SceneObjects& scene_;
   std::uint64_t places_ = 0;  ///< of all objects so far
@@ -335,6 +341,21 @@ class SceneReader {
   /// Index of an object by its file, the name of its material, and whether it is one-sided.
   std::map<std::tuple<std::filesystem::path, std::string, bool>, std::size_t> known_;
 };
+
+/// Implements read_scene_objects().
+/// @param places  whether files of places are read
+SceneObjects read_objects(const std::vector<std::filesystem::path>& files, TextureStore* textures,
+                          bool places, std::uint64_t memory_bytes) {
+  SceneObjects scene;
+  for (const std::filesystem::path& file : files) {
+    if (is_scene_file(file)) {
+      SceneReader(file, textures, places, memory_bytes, scene).read();
+    } else {
+      scene.objects.push_back({.file = file});
+    }
+  }
+  return scene;
+}
 
 }  // namespace
 
@@ -344,38 +365,25 @@ bool is_scene_file(const std::filesystem::path& path) {
 
 SceneObjects read_scene_objects(const std::vector<std::filesystem::path>& files,
                                 TextureStore* textures, std::uint64_t memory_bytes) {
-  SceneObjects scene;
-  for (const std::filesystem::path& file : files) {
-    if (is_scene_file(file)) {
-      SceneReader(file, textures, memory_bytes, scene).read();
-    } else {
-      scene.objects.push_back({.file = file});
-    }
-  }
-  return scene;
+  return read_objects(files, textures, true, memory_bytes);
 }
 
 std::vector<std::filesystem::path> object_files(const std::vector<std::filesystem::path>& files,
                                                 std::uint64_t memory_bytes) {
   std::vector<std::filesystem::path> found;
-  for (SceneObject& object : read_scene_objects(files, nullptr, memory_bytes).objects)
+  for (SceneObject& object : read_objects(files, nullptr, false, memory_bytes).objects)
     found.push_back(std::move(object.file));
   return found;
 }
 
 LightRig placed_lights(LightRig rig, const Placement& place) {
-  const auto turn = [&](glm::vec3& direction) {
-    const glm::dvec3 turned = glm::dmat3(place) * glm::dvec3(direction);
-    const double length = glm::length(turned);
-    if (length > 0) direction = glm::vec3(turned / length);
-  };
-  for (Sun& sun : rig.suns) turn(sun.to_sun);
+  for (Sun& sun : rig.suns) sun.to_sun = turned(sun.to_sun, place);
   for (PointLight& lamp : rig.points) lamp.position = place * glm::dvec4(lamp.position, 1);
   for (SpotLight& lamp : rig.spots) {
     lamp.position = place * glm::dvec4(lamp.position, 1);
-    turn(lamp.direction);
+    lamp.direction = turned(lamp.direction, place);
   }
-  turn(rig.sky.up);
+  rig.sky.up = turned(rig.sky.up, place);
   return rig;
 }
 

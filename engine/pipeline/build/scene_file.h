@@ -41,7 +41,8 @@ struct SceneObjects {
 [[nodiscard]] SceneObjects read_scene_objects(const std::vector<std::filesystem::path>& files,
                                               TextureStore* textures, std::uint64_t memory_bytes);
 
-/// Returns the files of the objects of files. @throws as read_scene_objects()
+/// Returns the files of the objects of files, without a look at their places.
+/// @throws as read_scene_objects()
 [[nodiscard]] std::vector<std::filesystem::path> object_files(
     const std::vector<std::filesystem::path>& files,
     std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max());

@@ -143,35 +143,20 @@ std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
   if (light_ == nullptr) return glm::vec3(0);
   const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
   glm::vec3 sum(0);
-  float lit = 0, dark = 0;  // points
+  float looked_at = 0;  // points that are not buried
+  bool seen = false;    // one of them is not dark
   for (std::size_t i = 0; i < count; ++i) {
     const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
     const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
-    const std::uint64_t own_seed = kLitPoints * seed + i;
-    const auto origin = step_off(scene_, at, side > 0);
-    if (!origin) continue;
-    // What light reaches is not buried; look around where there is none.
-    glm::vec3 arrives(0);
-    if (!light_->is_black()) {
-      const DirectLight::Result direct =
-          light_->irradiance(at.position, *origin, side * at.normal, lit_point_, own_seed);
-      arrives = direct.local + direct.sky;
-    }
-    if (arrives == glm::vec3(0)) {
-      const glm::vec3 upwards = side * at.geometric_normal;
-      if (is_buried(scene_, *origin, upwards, own_seed)) continue;
-      if (light_->is_black()) return glm::vec3(0);
-      if (sides_of(scene_.mesh(), point.triangle) == 2 &&
-          is_left_dark(*origin, upwards, own_seed)) {
-        dark += 1;
-        continue;
-      }
-    }
-    sum += finite_or_black(at.albedo / kPi * arrives);
-    lit += 1;
+    const Arriving arriving = look_at(at, side > 0, kLitPoints * seed + i);
+    if (arriving.place == Place::buried) continue;
+    if (light_->is_black()) return glm::vec3(0);
+    sum += finite_or_black(at.albedo / kPi * arriving.light);
+    looked_at += 1;
+    seen |= arriving.place == Place::seen;
   }
-  if (lit == 0) return {};
-  return sum / (lit + dark);
+  if (!seen) return {};
+  return sum / looked_at;
 }
 
 // Says whether light is unlikely to reach a place by way of other surfaces: a few paths find
@@ -212,19 +197,28 @@ bool PatchSampler::is_sunk(const SurfacePoint& point, std::uint64_t seed) const 
   return !origin || is_buried(scene_, *origin, at.geometric_normal, seed);
 }
 
-bool PatchSampler::is_seen(const SurfaceHit& at, bool front, std::uint64_t seed) const {
-  const auto origin = step_off(scene_, at, front);
-  if (!origin) return false;
+// Finds the light that arrives at one side of a place and, where there is none, whether any might.
+PatchSampler::Arriving PatchSampler::look_at(const SurfaceHit& at, bool front,
+                                             std::uint64_t seed) const {
   const float side = front ? 1 : -1;
+  const auto origin = step_off(scene_, at, front);
+  if (!origin) return {Place::buried};
+  // What light reaches is not buried; look around where there is none.
   if (!light_->is_black()) {
     const DirectLight::Result direct =
         light_->irradiance(at.position, *origin, side * at.normal, lit_point_, seed);
-    if (direct.local + direct.sky != glm::vec3(0)) return true;
+    const glm::vec3 light = direct.local + direct.sky;
+    if (light != glm::vec3(0)) return {Place::seen, light};
   }
   const glm::vec3 upwards = side * at.geometric_normal;
-  if (is_buried(scene_, *origin, upwards, seed)) return false;
-  return light_->is_black() || sides_of(scene_.mesh(), at.triangle) == 1 ||
-         !is_left_dark(*origin, upwards, seed);
+  if (is_buried(scene_, *origin, upwards, seed)) return {Place::buried};
+  const bool dark = sides_of(scene_.mesh(), at.triangle) == 2 && !light_->is_black() &&
+                    is_left_dark(*origin, upwards, seed);
+  return {dark ? Place::dark : Place::seen};
+}
+
+bool PatchSampler::is_seen(const SurfaceHit& at, bool front, std::uint64_t seed) const {
+  return look_at(at, front, seed).place == Place::seen;
 }
 
 std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {

@@ -72,6 +72,14 @@ class PatchSampler {
                                                    std::uint64_t seed) const;
   /// Says whether a point lies inside a solid.
   [[nodiscard]] bool is_sunk(const SurfacePoint& point, std::uint64_t seed) const;
+  /// What is on one side of a place: a solid, surfaces that pass no light on, or neither.
+  enum class Place : std::uint8_t { buried, dark, seen };
+  /// One side of a place, and the irradiance there, W/m^2.
+  struct Arriving {
+    Place place = Place::seen;
+    glm::vec3 light{0};
+  };
+  [[nodiscard]] Arriving look_at(const SurfaceHit& at, bool front, std::uint64_t seed) const;
   [[nodiscard]] bool is_left_dark(const glm::dvec3& origin, const glm::vec3& normal,
                                   std::uint64_t seed) const;
 

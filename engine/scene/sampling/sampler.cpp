@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/patch_sampler.h"
 #include "engine/scene/sampling/patch_stream.h"
+#include "engine/scene/sampling/places_by_area.h"
 #include "engine/scene/sampling/spacing_field.h"
 #include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/sampling/surface_patches.h"
@@ -107,25 +107,18 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
   const double area = sampled_area(mesh);
   const bool two_sided = std::ranges::any_of(mesh.materials, &Material::double_sided);
   if (!two_sided || !(area > 0)) return area;
-  // Look at places at equal steps of the area of double-sided materials
+  // Look at places on double-sided materials
   constexpr std::uint32_t kPlaces = 4096;
-  std::vector<double> reached(mesh.triangles.size());  // sums of it, up to and with each triangle
-  double sum = 0;
-  for (std::uint32_t i = 0; i < reached.size(); ++i) {
-    if (sides_of(mesh, i) == 2) sum += whole_triangle(mesh, i).area();
-    reached[i] = sum;
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (sides_of(mesh, i) == 2) triangles.push_back(i);
   }
-  if (!(sum > 0)) return area;
+  const PlacesByArea places(scene, triangles, 0);
+  if (!(places.area() > 0)) return area;
   const PatchSampler sampler(scene, &light, rays);
-  const SquarePoints places(0);
   std::atomic<std::uint32_t> hidden = 0;  // sides
   executor.for_each(kPlaces, [&](std::size_t i, unsigned) {
-    const double wanted = sum * (static_cast<double>(i) + 0.5) / kPlaces;
-    const auto found = std::ranges::lower_bound(reached, wanted);
-    const auto triangle = static_cast<std::uint32_t>(found - reached.begin());
-    const glm::vec2 square = places.square(static_cast<std::uint32_t>(i));
-    const float u = std::sqrt(square.x);  // uniform over the triangle
-    const SurfaceHit at = scene.surface(triangle, u * (1 - square.y), u * square.y);
+    const SurfaceHit at = places.place(static_cast<std::uint32_t>(i), kPlaces);
     // A side is looked at as often as a surfel has points; of two dark ones the front stays
     unsigned dark = 0;
     for (const bool front : {true, false}) {
@@ -138,7 +131,7 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
   });
   constexpr double kLeast = 0.05;  // of the area: more would be finer than anyone asks for
   const double share = static_cast<double>(hidden) / (2.0 * kPlaces);
-  return std::max(kLeast * area, area - share * 2 * sum);
+  return std::max(kLeast * area, area - share * 2 * places.area());
 }
 
 }  // namespace ptc

@@ -17,6 +17,7 @@
 
 #include "engine/base/low_discrepancy.h"
 #include "engine/scene/sampling/directions.h"
+#include "engine/scene/sampling/places_by_area.h"
 #include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/step_off.h"
 
@@ -28,7 +29,6 @@ constexpr std::uint32_t kOthers = 6;        // of those, that may meet fronts in
 constexpr std::size_t kMaxEmitters = 4096;  // places on emitters that are looked at, evenly spread
 constexpr std::uint32_t kProbes = 3;        // rays that tell what a place lies in
 constexpr int kMaxCrossings = 256;          // surfaces that such a ray is followed through
-constexpr double kLeastVolume = 1e-9;       // of a solid, over the area to the power of 1.5
 
 bool has_double_sided(const Mesh& mesh) {
   return std::any_of(mesh.materials.begin(), mesh.materials.end(),
@@ -148,20 +148,11 @@ void mark_lit(const RayScene& scene, const Solids& solids, const LightRig& light
 // Says whether rays from the back of a closed surface meet much beside backs.
 bool holds_something(const RayScene& scene, std::uint64_t seed,
                      std::span<const std::uint32_t> triangles) {
-  std::vector<double> reached;  // sums of the area up to and with each triangle
-  for (const std::uint32_t i : triangles) {
-    const double area = whole_triangle(scene.mesh(), i).area();
-    reached.push_back(reached.empty() ? area : reached.back() + area);
-  }
-  const SquarePoints points(seed), places(~seed);
+  const PlacesByArea places(scene, triangles, ~seed);
+  const SquarePoints points(seed);
   std::uint32_t others = 0;
   for (std::uint32_t i = 0; i < kRays && others <= kOthers; ++i) {
-    const double wanted = reached.back() * (i + 0.5) / kRays;
-    const auto found = std::lower_bound(reached.begin(), reached.end(), wanted);
-    const std::uint32_t triangle = triangles[static_cast<std::size_t>(found - reached.begin())];
-    const glm::vec2 place = places.square(i);
-    const float u = std::sqrt(place.x);  // uniform over the triangle
-    const SurfaceHit at = scene.surface(triangle, u * (1 - place.y), u * place.y);
+    const SurfaceHit at = places.place(i, kRays);
     const glm::vec3 inwards = -at.geometric_normal;
     const auto origin = step_off(scene, at.position, inwards);
     if (!origin) continue;
@@ -174,6 +165,11 @@ bool holds_something(const RayScene& scene, std::uint64_t seed,
 }
 
 }  // namespace
+
+bool looks_outwards(double volume, double area) {
+  constexpr double kLeastVolume = 1e-9;  // over the area to the power of 1.5
+  return volume > kLeastVolume * area * std::sqrt(area);
+}
 
 Solids find_solids(const Mesh& mesh) {
   Solids solids;
@@ -210,8 +206,7 @@ Solids find_solids(const Mesh& mesh) {
   solids.of_vertex.resize(first.size());
   for (std::uint32_t v = 0; v < first.size(); ++v) {
     const std::uint32_t n = number[root(parents, first[v])];
-    const bool outwards =
-        n != Solids::kNone && volume[n] > kLeastVolume * area[n] * std::sqrt(area[n]);
+    const bool outwards = n != Solids::kNone && looks_outwards(volume[n], area[n]);
     solids.of_vertex[v] = outwards ? n : Solids::kNone;
   }
   return solids;

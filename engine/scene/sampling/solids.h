@@ -20,6 +20,11 @@ struct Solids {
   std::uint32_t count = 0;
 };
 
+/// Says whether a closed surface looks outwards: whether its fronts enclose a volume.
+/// @param volume  sum over its triangles, positive where they turn their back to an inner point
+/// @param area    of the surface
+[[nodiscard]] bool looks_outwards(double volume, double area);
+
 /// Finds the closed surfaces of a mesh. Nothing is looked for where no material is double-sided.
 /// Memory: up to 24 bytes a triangle and 16 a vertex during the call.
 [[nodiscard]] Solids find_solids(const Mesh& mesh);

@@ -12,7 +12,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include "engine/base/low_discrepancy.h"
+#include "engine/base/numbers.h"
+#include "engine/scene/sampling/solids.h"
+#include "engine/scene/sampling/sub_triangle.h"
 
 namespace ptc {
 namespace {
@@ -53,7 +55,8 @@ class EvenPlaces {
 /// one in 2^64 has that sum.
 class ClosedTest {
  public:
-  void add(const MeshTriangle& triangle) {
+  /// @param shape  of the triangle
+  void add(const MeshTriangle& triangle, const SubTriangle& shape) {
     std::array<std::uint64_t, 3> corners;
     for (std::size_t k = 0; k < 3; ++k) {
       const glm::vec3& p = triangle.positions[k];
@@ -68,25 +71,26 @@ class ClosedTest {
     }
     // Add a tetrahedron from a vertex of the surface, which keeps the digits of small things far
     // from 0
-    if (!apex_) apex_ = glm::dvec3(triangle.positions[0]);
-    const glm::dvec3 a = glm::dvec3(triangle.positions[0]) - *apex_,
-                     b = glm::dvec3(triangle.positions[1]) - *apex_,
-                     c = glm::dvec3(triangle.positions[2]) - *apex_;
-    volume_ += glm::dot(a, glm::cross(b, c)) / 6;
-    area_ += 0.5 * glm::length(glm::cross(b - a, c - a));
+    if (!apex_) apex_ = shape.corner[0];
+    volume_ += glm::dot(shape.corner[0] - *apex_, shape.normal()) / 6;
+    area_ += shape.area();
   }
 
   /// Says whether the triangles are closed, with fronts that look outwards.
-  [[nodiscard]] bool is_solid() const {
-    return sum_ == 0 && volume_ > kLeastVolume * area_ * std::sqrt(area_);
-  }
+  [[nodiscard]] bool is_solid() const { return sum_ == 0 && looks_outwards(volume_, area_); }
 
  private:
-  static constexpr double kLeastVolume = 1e-9;  // over the area to the power of 1.5
   std::uint64_t sum_ = 0;
   std::optional<glm::dvec3> apex_;
   double volume_ = 0, area_ = 0;
 };
+
+/// Returns a place on the line from a corner of a triangle to the middle of the opposite edge.
+/// @param golden  0 to 1; even steps of it give even shares of the area
+glm::dvec3 place_on(const SubTriangle& shape, double golden) {
+  const auto& [a, b, c] = shape.corner;
+  return a + std::sqrt(golden) * 0.5 * ((b - a) + (c - a));
+}
 
 /// What was found of one part.
 struct PartSurvey {
@@ -97,7 +101,7 @@ struct PartSurvey {
 
 /// Reads the triangles of a part.
 /// @param all   counts them
-/// @param each  gets the area, the corner, and the two edges from there, of each triangle
+/// @param each  gets each triangle
 template <typename Each>
 PartSurvey survey_part(const MeshParts& parts, std::size_t part, SurfaceSurvey& all,
                        const Each& each) {
@@ -108,14 +112,11 @@ PartSurvey survey_part(const MeshParts& parts, std::size_t part, SurfaceSurvey& 
     for (const MeshTriangle& triangle : triangles) {
       const Material& material = parts.materials()[triangle.material];
       all.emits |= material.emission != glm::vec3(0);
-      const glm::dvec3 a(triangle.positions[0]);
-      const glm::dvec3 ab = glm::dvec3(triangle.positions[1]) - a,
-                       ac = glm::dvec3(triangle.positions[2]) - a;
-      const double area = 0.5 * glm::length(glm::cross(ab, ac));
-      found.area += area;
-      if (material.double_sided) found.backs += area;
-      closed.add(triangle);
-      each(area, a, ab, ac);
+      const SubTriangle shape = whole_triangle(triangle.positions);
+      found.area += shape.area();
+      if (material.double_sided) found.backs += shape.area();
+      closed.add(triangle, shape);
+      each(shape);
     }
   });
   found.solid = closed.is_solid();
@@ -193,15 +194,11 @@ SurfaceSurvey survey(MeshParts& parts, std::size_t places, bool lamps) {
   EvenPlaces by_area(places), by_count(places), placed_by_area(places);
   std::vector<PartSurvey> of_parts;
   for (std::size_t part = 0; part < parts.size(); ++part) {
-    of_parts.push_back(survey_part(
-        parts, part, found,
-        [&](double area, const glm::dvec3& a, const glm::dvec3& ab, const glm::dvec3& ac) {
-          const auto place = [&](double golden) {
-            return parts.origin() + a + std::sqrt(golden) * 0.5 * (ab + ac);
-          };
-          by_area.add(area, place);
-          by_count.add(1, place);
-        }));
+    of_parts.push_back(survey_part(parts, part, found, [&](const SubTriangle& shape) {
+      const auto place = [&](double golden) { return parts.origin() + place_on(shape, golden); };
+      by_area.add(shape.area(), place);
+      by_count.add(1, place);
+    }));
   }
   // Survey each shape of the meshes that stand in several places
   std::vector<PartSurvey> of_groups;
@@ -212,13 +209,10 @@ SurfaceSurvey survey(MeshParts& parts, std::size_t places, bool lamps) {
       one.add(placed.mesh, group.is_plain ? std::optional<Placement>() : Placement(group.shape));
       constexpr std::size_t kPlaces = 256;
       EvenPlaces on_mesh(kPlaces);
-      of_groups.push_back(survey_part(
-          one, 0, found,
-          [&](double area, const glm::dvec3& a, const glm::dvec3& ab, const glm::dvec3& ac) {
-            on_mesh.add(area, [&](double golden) {
-              return one.origin() + a + std::sqrt(golden) * 0.5 * (ab + ac);
-            });
-          }));
+      of_groups.push_back(survey_part(one, 0, found, [&](const SubTriangle& shape) {
+        on_mesh.add(shape.area(),
+                    [&](double golden) { return one.origin() + place_on(shape, golden); });
+      }));
       const std::vector<glm::dvec3> on_shape = on_mesh.take();
       const glm::dmat3 back = glm::inverse(group.shape);
       for (const std::uint32_t at : group.places) {

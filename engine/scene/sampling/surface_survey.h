@@ -36,7 +36,8 @@ struct SurfaceSurvey {
     return count;
   }
 
-  /// Of all meshes in all places; both sides of double-sided materials count, scene units squared.
+  /// The area of all meshes in all places, scene units squared. Both sides of double-sided
+  /// materials count.
   double area = 0;
   std::uint64_t triangles = 0;  ///< of all meshes, each once for each shape
   bool emits = false;           ///< a triangle has a material that emits light
