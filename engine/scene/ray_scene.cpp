@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -28,6 +29,8 @@
 
 #include "engine/base/embree.h"
 #include "engine/base/error.h"
+#include "engine/base/low_discrepancy.h"
+#include "engine/base/numbers.h"
 #include "engine/scene/texture.h"
 
 namespace ptc {
@@ -102,6 +105,8 @@ void check_material(const Material& material, const char* field) {
     require_request(material.emission[k] >= 0 && std::isfinite(material.emission[k]), field,
                     "mesh: the emission of a material is negative or not finite");
   }
+  require_request(material.opacity >= 0 && material.opacity <= 1, field,
+                  "mesh: the opacity of a material is not 0 to 1");
 }
 
 }  // namespace
@@ -145,6 +150,10 @@ struct RayScene::Impl {
   void measure();
   // Hands the mesh to Embree and builds its tree.
   void build();
+  // Embree's filter: takes out the hits that do not count. @pre its user data is an Impl
+  static void let_through(const RTCFilterFunctionNArguments* arguments);
+  // Says whether a ray meets a triangle, rather than pass through it.
+  [[nodiscard]] bool stops(const RTCRay& ray, const RTCHit& hit) const;
   // Returns a ray in Embree's frame, or nothing when it cannot meet the mesh.
   [[nodiscard]] std::optional<LocalRay> localise(const glm::dvec3& origin,
                                                  const glm::vec3& direction, double near,
@@ -161,8 +170,7 @@ struct RayScene::Impl {
   }
   // Returns the colour of a texture at a place on a triangle; white without a texture.
   [[nodiscard]] glm::vec3 texture_at(const Texture* texture, const TextureWrap& wrap,
-                                     const std::array<std::uint32_t, 3>& corners, float u,
-                                     float v) const;
+                                     std::uint32_t triangle, float u, float v) const;
 
   const Mesh& mesh;
   std::atomic<std::int64_t> bytes = 0;  // that Embree holds, as its monitor reports them
@@ -217,6 +225,11 @@ void RayScene::Impl::build() {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              mesh.triangles.data(), 0, sizeof(mesh.triangles.front()),
                              mesh.triangles.size());
+  if (!std::ranges::all_of(mesh.materials, &Material::is_opaque)) {
+    rtcSetGeometryUserData(geometry, this);
+    rtcSetGeometryIntersectFilterFunction(geometry, let_through);
+    rtcSetGeometryOccludedFilterFunction(geometry, let_through);
+  }
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene, geometry);
   // Build a robust tree: watertight at edges, and what a ray hits does not depend on the shape of
@@ -224,6 +237,25 @@ void RayScene::Impl::build() {
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcCommitScene(scene);
   check_device(device);
+}
+
+void RayScene::Impl::let_through(const RTCFilterFunctionNArguments* arguments) {
+  const Impl& self = *static_cast<const Impl*>(arguments->geometryUserPtr);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == 0) continue;
+    const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, i);
+    const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
+    if (!self.stops(ray, hit)) arguments->valid[i] = 0;
+  }
+}
+
+bool RayScene::Impl::stops(const RTCRay& ray, const RTCHit& hit) const {
+  const float opacity = opacity_at(mesh, hit.primID, {hit.u, hit.v});
+  if (opacity >= 1 || opacity <= 0) return opacity > 0;
+  std::uint64_t luck = hit.primID;
+  for (const float part : {ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z})
+    luck = splitmix64(luck ^ std::bit_cast<std::uint32_t>(part));
+  return to_unit(static_cast<std::uint32_t>(luck >> 32)) < opacity;
 }
 
 // A ray that begins far outside starts where it enters the box around the mesh, so that its origin
@@ -263,12 +295,9 @@ glm::dvec3 RayScene::Impl::shading_normal(const std::array<std::uint32_t, 3>& co
 }
 
 glm::vec3 RayScene::Impl::texture_at(const Texture* texture, const TextureWrap& wrap,
-                                     const std::array<std::uint32_t, 3>& corners, float u,
-                                     float v) const {
+                                     std::uint32_t triangle, float u, float v) const {
   if (texture == nullptr || mesh.uvs.empty()) return glm::vec3(1);
-  const glm::vec2 uv =
-      (1 - u - v) * mesh.uvs[corners[0]] + u * mesh.uvs[corners[1]] + v * mesh.uvs[corners[2]];
-  return sample_texture(*texture, uv, wrap);
+  return sample_texture(*texture, uv_at(mesh, triangle, {u, v}), wrap);
 }
 
 RayScene::RayScene(const Mesh& mesh) : impl_(std::make_unique<Impl>(mesh)) {}
@@ -364,7 +393,7 @@ bool RayScene::is_plain(std::uint32_t triangle) const {
   const Mesh& mesh = impl_->mesh;
   const Material& material = mesh.materials[mesh.material_of[triangle]];
   return mesh.normals.empty() && mesh.colours.empty() && !material.texture &&
-         !material.emission_texture;
+         !material.emission_texture && material.is_opaque();
 }
 
 SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
@@ -386,10 +415,11 @@ SurfaceHit RayScene::surface(std::uint32_t triangle, float u, float v) const {
   hit.geometric_normal = glm::vec3(geometric);
   hit.normal = glm::vec3(impl_->shading_normal(corners, u_wide, v_wide, geometric));
   hit.albedo = material.albedo *
-               impl_->texture_at(material.texture.get(), material.wrap, corners, u, v) *
+               impl_->texture_at(material.texture.get(), material.wrap, triangle, u, v) *
                impl_->colour_at(corners, u, v);
   hit.emission = material.emission * impl_->texture_at(material.emission_texture.get(),
-                                                       material.emission_wrap, corners, u, v);
+                                                       material.emission_wrap, triangle, u, v);
+  hit.opacity = opacity_at(mesh, triangle, {u, v});
   return hit;
 }
 

@@ -26,7 +26,8 @@ struct SurfaceHit {
   glm::vec3 geometric_normal{0};  ///< unit, of the triangle's front side (counter-clockwise)
   glm::vec3 normal{0};    ///< unit, interpolated; never on the back side of the geometric normal
   glm::vec3 albedo{0};    ///< reflectance of the material, times texture and vertex colour there
-  glm::vec3 emission{0};  ///< radiance that the front side emits, W/(m^2 sr)
+  glm::vec3 emission{0};  ///< radiance that the front side emits, W/(m^2 sr), where it is opaque
+  float opacity = 1;      ///< share of light that the surface stops there
   bool front = true;      ///< whether the ray met the front side
 };
 
@@ -43,8 +44,9 @@ struct TriangleHit {
 /// Rays are moved into a frame at the middle of the mesh, in double, before they become float, so
 /// that the precision is that of the mesh's extent wherever the mesh lies and wherever the ray
 /// begins. A ray through a shared edge or vertex never slips through; it hits either triangle.
-/// Memory: bytes(), about 80 bytes for each triangle. Threads: const members may be called
-/// concurrently.
+/// Where a material is not opaque, a ray meets it or goes on, by chance: the share of rays that
+/// meet it is its opacity there. The same ray has the same luck every time. Memory: bytes(), about
+/// 80 bytes for each triangle. Threads: const members may be called concurrently.
 class RayScene {
  public:
   /// Builds Embree's tree over the mesh.

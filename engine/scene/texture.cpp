@@ -78,6 +78,27 @@ glm::vec3 sample_texture(const Texture& image, const glm::vec2& uv, const Textur
                around(uv.y, image.height(), wrap.v, true));
 }
 
+float opacity_at(const Material& material, const std::optional<glm::vec2>& uv) {
+  float opacity = material.opacity;
+  if (material.opacity_texture && uv)
+    opacity *= sample_texture(*material.opacity_texture, *uv, material.wrap).x;
+  if (material.opacity_cutoff > 0) return opacity >= material.opacity_cutoff ? 1 : 0;
+  return opacity;
+}
+
+float opacity_at(const Mesh& mesh, std::uint32_t triangle, const glm::vec2& barycentric) {
+  const Material& material = mesh.materials[mesh.material_of[triangle]];
+  if (material.is_opaque()) return 1;
+  if (mesh.uvs.empty()) return opacity_at(material, std::nullopt);
+  return opacity_at(material, uv_at(mesh, triangle, barycentric));
+}
+
+glm::vec2 uv_at(const Mesh& mesh, std::uint32_t triangle, const glm::vec2& barycentric) {
+  const auto& c = mesh.triangles[triangle];
+  return (1 - barycentric.x - barycentric.y) * mesh.uvs[c[0]] + barycentric.x * mesh.uvs[c[1]] +
+         barycentric.y * mesh.uvs[c[2]];
+}
+
 glm::vec3 sample_panorama(const Texture& image, double x, double y) {
   return blend(image, neighbours(x, image.width(), Border::wrap),
                neighbours(y, image.height(), Border::end));

@@ -15,6 +15,16 @@ std::string slurp(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+std::string tga_with_alpha(const std::vector<std::uint8_t>& alpha) {
+  std::string bytes(12, '\0');
+  bytes[2] = 2;  // true colour, not compressed
+  bytes += raw(static_cast<std::uint16_t>(alpha.size())) + raw<std::uint16_t>(1);
+  bytes += std::string("\x20\x28");  // 32 bits, of which 8 are alpha; the top row first
+  for (const std::uint8_t value : alpha)
+    bytes += "\xff\xff\xff" + std::string(1, static_cast<char>(value));
+  return bytes;
+}
+
 std::string refusal(const std::function<void()>& call) {
   try {
     call();

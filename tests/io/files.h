@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "tests/support/temporary_directory.h"
 
@@ -23,6 +24,9 @@ std::string raw(T value) {
   std::memcpy(bytes.data(), &value, sizeof value);
   return bytes;
 }
+
+/// Returns a TGA of one row of white pixels with these alphas.
+[[nodiscard]] std::string tga_with_alpha(const std::vector<std::uint8_t>& alpha);
 
 /// Returns the message of the DataError, FormatError or std::system_error that `call` throws; empty
 /// when it throws nothing. Any other exception passes.

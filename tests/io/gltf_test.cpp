@@ -440,12 +440,47 @@ TEST_CASE("gltf: samplers say how textures go on, and what is not understood is 
   CHECK(file.mesh.materials[0].wrap == TextureWrap{Wrap::clamp, Wrap::mirror});
   CHECK(file.mesh.materials[0].emission_wrap == TextureWrap{});
   CHECK(file.mesh.materials[0].emission_texture);
-  REQUIRE(file.warnings.size() == 2);
-  CHECK(file.warnings[0] ==
-        "a material is solid, because its transparency is left out: 'leaf' (MASK)");
-  CHECK(file.warnings[1] == "2 extensions of glTF are left out: KHR_materials_volume; EXT_new");
+  REQUIRE(file.warnings.size() == 1);
+  CHECK(file.warnings[0] == "2 extensions of glTF are left out: KHR_materials_volume; EXT_new");
   json["textures"][0]["sampler"] = 2;
   CHECK_FALSE(files.fault(json).empty());
+}
+
+TEST_CASE("gltf: alpha counts where a material masks or blends", "[io][gltf]") {
+  const Files files;
+  files.scratch.file("a.tga", tga_with_alpha({0, 51}));
+  Json json = document();
+  json["textures"] = Json::parse(R"([{"source": 0}])");
+  json["images"] = Json::parse(R"([{"uri": "a.tga"}])");
+  json["meshes"][0]["primitives"][0]["material"] = 0;
+  json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 2;
+  const auto read = [&](const char* material) {
+    json["materials"] = {Json::parse(material)};
+    const MeshFile file = files.read(json);
+    CHECK(file.warnings.empty());
+    return file.mesh.materials[0];
+  };
+  const Material opaque = read(R"({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.25],
+      "baseColorTexture": {"index": 0}}})");
+  CHECK(opaque.is_opaque());
+  const Material mask = read(R"({"alphaMode": "MASK", "pbrMetallicRoughness": {
+      "baseColorFactor": [1, 1, 1, 0.25], "baseColorTexture": {"index": 0}}})");
+  CHECK(mask.opacity == 0.25F);
+  CHECK(mask.opacity_cutoff == 0.5F);
+  REQUIRE(mask.opacity_texture);
+  CHECK(mask.opacity_texture->at(0, 0) == glm::vec3(0));
+  CHECK(mask.opacity_texture->at(1, 0).x == Approx(0.2));
+  const Material blend = read(R"({"alphaMode": "BLEND", "alphaCutoff": 0.75, "extensions": {
+      "KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [1, 1, 1, 0.5]}}})");
+  CHECK(blend.opacity == 0.5F);
+  CHECK(blend.opacity_cutoff == 0);
+  CHECK_FALSE(blend.opacity_texture);
+  CHECK(read(R"({"alphaMode": "MASK", "alphaCutoff": 0.75})").opacity_cutoff == 0.75F);
+  // A picture in the buffer, twice
+  json["images"][0] = {{"uri", "data:image/png;base64,AAAA"}};
+  json["materials"] = Json::parse(R"([{"alphaMode": "MASK", "pbrMetallicRoughness": {
+      "baseColorTexture": {"index": 0}}}])");
+  CHECK(files.read(json).warnings.size() == 1);  // that it is no picture, once
 }
 
 TEST_CASE("gltf: lights stand and shine as their nodes do", "[io][gltf]") {

@@ -107,6 +107,19 @@ class Pictures(unittest.TestCase):
         self.assertTrue(np.array_equal(*results))
         return results[0]
 
+    def check_opacity(self, data, name, expected):
+        """Checks the alpha of a picture, of 8 bits; none is to be found where all of it is 255."""
+        path = pathlib.Path(self.folder.name) / name
+        path.write_bytes(data)
+        for more in ([], [str(self.filler)]):
+            done = subprocess.run([DUMP, "--opacity", str(path), *more], capture_output=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            if np.all(expected == 255):
+                self.assertEqual(done.stdout, b"")
+                continue
+            values = np.frombuffer(done.stdout.partition(b"\n")[2], "<f4").reshape(*expected.shape, 3)
+            self.assertTrue(np.array_equal(np.round(values[..., 0] * 255), expected), name)
+
     def check(self, data, name, expected, most=0):
         """Checks against expected shares of sRGB, up to `most` steps of 8 bits."""
         got = self.read(data, name)
@@ -129,6 +142,9 @@ class Pictures(unittest.TestCase):
                 one = np.repeat(grey / 255, 3, -1)
                 self.check(png(rgb, 2, 8, interlaced), "rgb.png", shares)
                 self.check(png(np.concatenate([rgb, alpha], -1), 6, 8, interlaced), "rgba.png", shares)
+                for data in (png(np.concatenate([rgb, alpha], -1), 6, 8, interlaced),
+                             png(np.concatenate([grey, alpha], -1), 4, 8, interlaced), png(rgb, 2, 8, interlaced)):
+                    self.check_opacity(data, "alpha.png", np.asarray(Image.open(io.BytesIO(data)).convert("RGBA"))[..., 3])
                 self.check(png(grey, 0, 8, interlaced), "grey.png", one)
                 self.check(png(np.concatenate([grey, alpha], -1), 4, 8, interlaced), "grey_alpha.png", one)
                 self.check(png(deep, 2, 16, interlaced), "deep.png", deep / 65535)
@@ -156,6 +172,10 @@ class Pictures(unittest.TestCase):
         picture = Image.fromarray(rgb)
         self.check(self.saved(picture, "BMP"), "a.bmp", rgb / 255)
         self.check(self.saved(picture, "TGA"), "a.tga", rgb / 255)
+        with_alpha = Image.fromarray(np.concatenate([rgb, 255 - rgb[..., :1]], -1))
+        self.check_opacity(self.saved(with_alpha, "TGA"), "c.tga", 255 - rgb[..., 0])
+        paletted = with_alpha.quantize(16)
+        self.check_opacity(self.saved(paletted, "PNG"), "p.png", np.asarray(paletted.convert("RGBA"))[..., 3])
         self.check(self.saved(picture, "TGA", compression="tga_rle"), "b.tga", rgb / 255)
 
     def test_hdr(self):

@@ -93,6 +93,42 @@ TEST_CASE("obj: a texture with -clamp ends at its borders", "[io][mesh]") {
   CHECK(mesh.materials[1].wrap == TextureWrap{});
 }
 
+TEST_CASE("obj: d, Tr and map_d say how opaque a material is", "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  // A TGA of two pixels with alpha 0 and 255, a PNG without alpha, and a TGA that is all opaque
+  scratch.file("a.tga", tga_with_alpha({0, 255}));
+  scratch.file("solid.tga", tga_with_alpha({255, 255}));
+  write_png(scratch.path() / "grey.png", {2, 1, {glm::vec3(0), glm::vec3(1)}});
+  scratch.file("a.mtl",
+               "newmtl a\nd 0.25\nnewmtl b\nTr 0.25\nnewmtl c\nmap_d a.tga\nnewmtl d\n"
+               "map_d grey.png\nnewmtl e\nmap_d solid.tga\nd nan\nd\nnewmtl f\nd -1\nnewmtl g\n"
+               "map_Kd a.tga\nd 7\n");
+  std::string text = kSquare + "mtllib a.mtl\n";
+  for (const char* name : {"a", "b", "c", "d", "e", "f", "g"})
+    text += "usemtl " + std::string(name) + "\nf 1 2 3\n";
+  const MeshFile file = read(scratch, text);
+  CHECK(file.warnings.empty());
+  const std::vector<Material>& materials = file.mesh.materials;
+  REQUIRE(materials.size() == 7);
+  const std::vector<float> opacity{0.25F, 0.75F, 1, 1, 1, 0, 1};
+  for (std::size_t i = 0; i < 7; ++i) {
+    CHECK(materials[i].opacity == opacity[i]);
+    CHECK(materials[i].opacity_cutoff == 0);
+    CHECK((materials[i].opacity_texture != nullptr) == (i == 2 || i == 3));
+    CHECK(materials[i].is_opaque() == (i == 4 || i == 6));
+  }
+  for (const std::size_t i : {2U, 3U}) {
+    CHECK(materials[i].opacity_texture->at(0, 0) == glm::vec3(0));
+    CHECK(materials[i].opacity_texture->at(1, 0) == glm::vec3(1));
+  }
+  // A material that takes the place of all keeps their opacity
+  const Mesh other =
+      read_mesh(scratch.path() / "a.obj", {.material = Material{.albedo = glm::vec3(0.75F)}}).mesh;
+  CHECK(other.materials[0].opacity == 0.25F);
+  CHECK(other.materials[2].opacity_texture);
+  CHECK(other.materials[2].albedo == glm::vec3(0.75F));
+}
+
 TEST_CASE("obj: faces without normals among others get flat ones", "[io][mesh]") {
   const test::TemporaryDirectory scratch;
   const Mesh mesh =

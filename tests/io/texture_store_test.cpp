@@ -1,7 +1,10 @@
 // Textures in memory and in tiles on the disk.
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <thread>
@@ -10,6 +13,9 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/io/image/byte_range.h"
+#include "engine/io/image/srgb.h"
 #include "engine/io/image/texture.h"
 #include "engine/io/mesh/mesh.h"
 #include "tests/io/files.h"
@@ -140,4 +146,49 @@ TEST_CASE("texture store: what cannot be decoded row by row is refused by its si
   CHECK_THROWS_AS(poor->read(path), LimitError);
   CHECK_THROWS_WITH(poor->read(path),
                     Contains("a.bmp: a BMP or TGA takes ") && Contains("`run.memory_bytes`"));
+}
+
+TEST_CASE("texture store: opacity is alpha, or grey where a picture has none", "[io][texture]") {
+  const test::TemporaryDirectory scratch;
+  const auto read = [&](const std::shared_ptr<TextureStore>& store, const char* name, bool grey) {
+    const InputFile file(scratch.path() / name);
+    return store->read_opacity(ByteRange(file, 0, file.size()), name, grey);
+  };
+  std::vector<std::uint8_t> alpha;
+  for (unsigned i = 0; i < 300; ++i) alpha.push_back(static_cast<std::uint8_t>(i * 7));
+  scratch.file("a.tga", tga_with_alpha(alpha));
+  scratch.file("opaque.tga", tga_with_alpha(std::vector<std::uint8_t>(300, 255)));
+  const Image grey = steps(300, 5);
+  write_png(scratch.path() / "grey.png", grey);
+  write_png(scratch.path() / "white.png", {1, 1, {glm::vec3(1)}});
+  write_png(scratch.path() / "filler.png", steps(1000, 100));
+  write_exr(scratch.path() / "b.exr", 2, 1, {{{.name = ""}, {0.25F, 0.5F, 0.75F, 2, 3, 4}}});
+  for (const bool on_disk : {false, true}) {
+    const auto store = on_disk ? TextureStore::make(600'000, scratch.path()) : TextureStore::make();
+    if (on_disk) CHECK(store->read(scratch.path() / "filler.png").bytes() == 300'000);
+    const std::uint64_t before = store->bytes();
+    const auto found = read(store, "a.tga", true);
+    REQUIRE(found);
+    CHECK((found->store() != nullptr) == on_disk);
+    for (unsigned x = 0; x < 300; ++x)
+      REQUIRE(found->at(x, 0) == glm::vec3(static_cast<float>(alpha[x]) / 255));
+    CHECK_FALSE(read(store, "opaque.tga", false));
+    CHECK_FALSE(read(store, "grey.png", false));
+    CHECK_FALSE(read(store, "white.png", true));
+    CHECK_FALSE(read(store, "b.exr", false));
+    if (!on_disk) CHECK(store->bytes() == before + 300);
+    // The mean of what is stored, without a curve
+    const auto of_grey = read(store, "grey.png", true);
+    REQUIRE(of_grey);
+    for (unsigned x = 0; x < 300; ++x) {
+      const glm::vec3& p = grey.at(x, 2);
+      const auto stored = [](float c) { return std::round(255 * linear_to_srgb(double{c})); };
+      const double mean = (stored(p.x) + stored(p.y) + stored(p.z)) / 3;
+      REQUIRE(of_grey->at(x, 2).x * 255 == Approx(mean).margin(0.51));
+    }
+    const auto of_exr = read(store, "b.exr", true);
+    REQUIRE(of_exr);
+    CHECK(of_exr->at(0, 0).x == Approx(0.5).margin(0.002));
+    CHECK(of_exr->at(1, 0).x == 1);
+  }
 }

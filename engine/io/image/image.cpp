@@ -43,21 +43,20 @@ Image read_all(RowReader& reader) {
 }  // namespace
 
 std::unique_ptr<RowReader> open_picture(const ByteRange& bytes, const std::string& name,
-                                        const PictureLimits& limits) {
+                                        const PictureLimits& limits, Channels channels) {
   std::array<std::byte, 16> head{};
   const std::span<std::byte> first =
       std::span(head).first(std::min<std::uint64_t>(head.size(), bytes.size()));
   bytes.read(0, first);
+  const bool is_tga = lower_extension(name) == ".tga", is_bmp = begins_with(first, "BM");
+  if (begins_with(first, "\x89PNG\r\n\x1a\n")) return open_png(bytes, name, limits, channels);
+  const bool for_alpha = channels == Channels::alpha;
   if (begins_with(first, "\x76\x2f\x31\x01") && bytes.whole_file() != nullptr)
-    return open_exr(bytes.whole_file()->path(), limits);
-  if (begins_with(first, "\x89PNG\r\n\x1a\n")) return open_png(bytes, name, limits);
-  if (begins_with(first, "\xff\xd8")) return open_jpeg(bytes, name, limits);
+    return for_alpha ? nullptr : open_exr(bytes.whole_file()->path(), limits);
+  if (begins_with(first, "\xff\xd8")) return for_alpha ? nullptr : open_jpeg(bytes, name, limits);
   if (begins_with(first, "#?RADIANCE\n") || begins_with(first, "#?RGBE\n"))
-    return open_hdr(bytes, name, limits);
-  const bool is_tga = lower_extension(name) == ".tga";
-  if (is_tga || begins_with(first, "BM")) {
-    return open_by_stb(bytes, name, !begins_with(first, "BM"), limits);
-  }
+    return for_alpha ? nullptr : open_hdr(bytes, name, limits);
+  if (is_tga || is_bmp) return open_by_stb(bytes, name, !is_bmp, limits, channels);
   throw DataError(name + ": not a PNG, JPEG, BMP, HDR, TGA or EXR picture");
 }
 

@@ -75,6 +75,9 @@ void make_linear(PixelType type, std::span<const std::byte> stored, std::span<gl
         value.setBits(at<std::uint16_t>(from, c));
         return sane(value);
       });
+    case PixelType::share8:
+      return convert(
+          [&](std::size_t) { return static_cast<float>(at<std::uint8_t>(from, 0)) / 255; });
     case PixelType::full:
       return convert([&](std::size_t c) { return sane(at<float>(from, c)); });
   }

@@ -15,12 +15,15 @@ enum class PixelType : std::uint8_t {
   srgb16,  ///< R, G, B of 16 bits on the sRGB curve
   rgbe,    ///< mantissas of R, G and B and their exponent: Ward, "Real Pixels", 1991
   half,    ///< R, G, B, linear, of 16 bits
-  full     ///< R, G, B, linear, of 32 bits
+  full,    ///< R, G, B, linear, of 32 bits
+  share8   ///< a single linear value of 8 bits for R, G and B; 255 stands for 1
 };
 
 /// Returns the size of a pixel, bytes.
 [[nodiscard]] constexpr std::size_t pixel_bytes(PixelType type) noexcept {
   switch (type) {
+    case PixelType::share8:
+      return 1;
     case PixelType::srgb8:
       return 3;
     case PixelType::rgbe:

@@ -20,6 +20,12 @@ struct PictureLimits {
   std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max();
 };
 
+/// Which values of its pixels a picture is opened for.
+enum class Channels : std::uint8_t {
+  colour,
+  alpha  ///< as PixelType::share8; 1 where the picture has none
+};
+
 /// Decodes a picture from the top down, some rows at a time.
 class RowReader {
  public:
@@ -47,11 +53,13 @@ class RowReader {
 /// Opens a picture; its first bytes decide its format, except that a TGA is known by its name.
 /// @param bytes  what they are in must outlive the reader
 /// @param name   name of the picture for errors
+/// @return null for the alpha of a picture in a format that has none here: JPEG, HDR and EXR
 /// @throws DataError when the bytes are no picture that can be read, or break a limit on pixels;
 ///         LimitError when decoding takes more memory than it may; std::system_error
 [[nodiscard]] std::unique_ptr<RowReader> open_picture(const ByteRange& bytes,
                                                       const std::string& name,
-                                                      const PictureLimits& limits);
+                                                      const PictureLimits& limits,
+                                                      Channels channels = Channels::colour);
 
 // The readers of each format, which open_picture() chooses from.
 
@@ -62,11 +70,17 @@ class RowReader {
 [[nodiscard]] std::unique_ptr<RowReader> open_jpeg(const ByteRange& bytes, const std::string& name,
                                                    const PictureLimits& limits);
 [[nodiscard]] std::unique_ptr<RowReader> open_png(const ByteRange& bytes, const std::string& name,
-                                                  const PictureLimits& limits);
+                                                  const PictureLimits& limits, Channels channels);
 /// Decodes a BMP or TGA as a whole through stb.
 [[nodiscard]] std::unique_ptr<RowReader> open_by_stb(const ByteRange& bytes,
                                                      const std::string& name, bool is_tga,
-                                                     const PictureLimits& limits);
+                                                     const PictureLimits& limits,
+                                                     Channels channels);
+
+/// Takes the alpha out of pixels of R, G, B and alpha, of 8 bits each.
+inline void take_alpha(std::span<const std::byte> pixels, std::span<std::byte> alpha) {
+  for (std::size_t i = 0; i < alpha.size(); ++i) alpha[i] = pixels[4 * i + 3];
+}
 
 /// Checks the size of a picture before anything is allocated for it. Deflate, the end-of-band runs
 /// of JPEG and run lengths make fewer than 8448 pixels of a byte (in a 1-bit PNG), so a small file

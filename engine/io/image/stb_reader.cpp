@@ -110,7 +110,7 @@ bool bmp_is_complete(std::span<const std::byte> bytes) {
 class StbReader final : public RowReader {
  public:
   StbReader(const ByteRange& bytes, const std::string& name, bool is_tga,
-            const PictureLimits& limits) {
+            const PictureLimits& limits, Channels channels) {
     const auto refuse = [&](const std::string& rule) { throw DataError(name + ": " + rule); };
     if (bytes.size() > kMaxFileBytes) refuse("the picture has more than 1 GiB");
     check_picture_memory(bytes.size(), kWhy, limits, name);
@@ -126,15 +126,25 @@ class StbReader final : public RowReader {
     height_ = static_cast<unsigned>(height);
     check_picture_size(width_, height_, file.size(), limits, name);
     const std::size_t pixels = std::size_t{width_} * height_;
+    const bool alpha = channels == Channels::alpha;
+    const int components = alpha ? 4 : 3;
     constexpr std::uint64_t kPixel = 4 + 3;  // as stb decodes it, and as it is kept
     check_picture_memory(file.size() + kPixel * pixels, kWhy, limits, name);
     if (!(is_tga ? tga_is_complete(file) : bmp_is_complete(file)))
       refuse("offset " + std::to_string(file.size()) + ": the picture ends too early");
     const std::unique_ptr<stbi_uc, StbFree> decoded(
-        stbi_load_from_memory(data, size, &width, &height, nullptr, 3));
+        stbi_load_from_memory(data, size, &width, &height, nullptr, components));
     if (!decoded) refuse(stbi_failure_reason());
-    const auto stored = std::as_bytes(std::span(decoded.get(), 3 * pixels));
-    rows_ = WholeRows({stored.begin(), stored.end()});
+    const auto stored =
+        std::as_bytes(std::span(decoded.get(), static_cast<std::size_t>(components) * pixels));
+    if (alpha) {
+      type_ = PixelType::share8;
+      std::vector<std::byte> shares(pixels);
+      take_alpha(stored, shares);
+      rows_ = WholeRows(std::move(shares));
+    } else {
+      rows_ = WholeRows({stored.begin(), stored.end()});
+    }
   }
 
   void read(unsigned /*rows*/, std::span<std::byte> out) override { rows_.take(out); }
@@ -147,8 +157,8 @@ class StbReader final : public RowReader {
 }  // namespace
 
 std::unique_ptr<RowReader> open_by_stb(const ByteRange& bytes, const std::string& name, bool is_tga,
-                                       const PictureLimits& limits) {
-  return std::make_unique<StbReader>(bytes, name, is_tga, limits);
+                                       const PictureLimits& limits, Channels channels) {
+  return std::make_unique<StbReader>(bytes, name, is_tga, limits, channels);
 }
 
 }  // namespace ptc

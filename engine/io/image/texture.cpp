@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <mutex>
 #include <stdexcept>
@@ -28,6 +29,58 @@ constexpr std::size_t tile_bytes(PixelType type) noexcept {
 constexpr unsigned tiles_across(unsigned width) noexcept {
   return (width + Texture::kTileWidth - 1) / Texture::kTileWidth;
 }
+
+/// The rows of a picture as shares of 8 bits: its alpha or, of a picture of colours, their means.
+class OpacityRows final : public RowReader {
+ public:
+  explicit OpacityRows(std::unique_ptr<RowReader> from) : from_(std::move(from)) {
+    width_ = from_->width();
+    height_ = from_->height();
+    type_ = PixelType::share8;
+  }
+
+  void read(unsigned rows, std::span<std::byte> out) override {
+    if (from_->type() == PixelType::share8) {
+      from_->read(rows, out);
+    } else {
+      stored_.resize(out.size() * pixel_bytes(from_->type()));
+      from_->read(rows, stored_);
+      for (std::size_t i = 0; i < out.size(); ++i) out[i] = mean(i);
+    }
+    opaque_ &= std::ranges::all_of(out, [](std::byte share) { return share == std::byte{255}; });
+  }
+
+  /// Says whether all rows so far are 1.
+  [[nodiscard]] bool is_opaque() const noexcept { return opaque_; }
+
+ private:
+  /// Returns the mean of a pixel, without its curve where it is stored on one.
+  [[nodiscard]] std::byte mean(std::size_t pixel) const {
+    const std::size_t bytes = pixel_bytes(from_->type());
+    const std::span<const std::byte> stored = std::span(stored_).subspan(pixel * bytes, bytes);
+    if (from_->type() == PixelType::srgb8 || from_->type() == PixelType::srgb16) {
+      const std::size_t step = bytes / 3;
+      unsigned sum = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        std::uint16_t value = std::to_integer<std::uint16_t>(stored[c * step]);
+        if (step == 2) {
+          std::memcpy(&value, &stored[c * step], sizeof(value));
+          value = static_cast<std::uint16_t>(value >> 8);
+        }
+        sum += value;
+      }
+      return static_cast<std::byte>((sum + 1) / 3);
+    }
+    glm::vec3 value;
+    make_linear(from_->type(), stored, std::span(&value, 1));
+    const float share = std::clamp((value.x + value.y + value.z) / 3, 0.0F, 1.0F);
+    return static_cast<std::byte>(std::lround(255 * share));
+  }
+
+  std::unique_ptr<RowReader> from_;
+  std::vector<std::byte> stored_;
+  bool opaque_ = true;
+};
 
 }  // namespace
 
@@ -143,10 +196,26 @@ Texture TextureStore::read(const std::filesystem::path& path, std::uint64_t max_
 
 Texture TextureStore::read(const ByteRange& bytes, const std::string& name,
                            std::uint64_t max_pixels) {
-  return load(
-      *open_picture(bytes, name,
-                    {.max_pixels = max_pixels,
-                     .memory_bytes = memory_bytes_ - std::min(memory_bytes_, this->bytes())}));
+  return load(*open_picture(bytes, name, limits(max_pixels)));
+}
+
+PictureLimits TextureStore::limits(std::uint64_t max_pixels) const {
+  return {.max_pixels = max_pixels,
+          .memory_bytes = memory_bytes_ - std::min(memory_bytes_, bytes())};
+}
+
+std::optional<Texture> TextureStore::read_opacity(const ByteRange& bytes, const std::string& name,
+                                                  bool grey, std::uint64_t max_pixels) {
+  for (const Channels channels : {Channels::alpha, Channels::colour}) {
+    if (channels == Channels::colour && !grey) break;
+    auto reader = open_picture(bytes, name, limits(max_pixels), channels);
+    if (!reader) continue;
+    OpacityRows rows(std::move(reader));
+    Texture texture = load(rows);
+    if (!rows.is_opaque()) return texture;
+    held_ -= texture.bytes();
+  }
+  return {};
 }
 
 Texture TextureStore::load(RowReader& reader) {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ namespace ptc {
 class ByteRange;
 class RowReader;
 class TextureStore;
+struct PictureLimits;
 
 /// A picture of linear RGB values that no longer changes.
 /// Threads: const members may be called concurrently.
@@ -98,6 +100,16 @@ class TextureStore : public std::enable_shared_from_this<TextureStore> {
   [[nodiscard]] Texture read(const ByteRange& bytes, const std::string& name,
                              std::uint64_t max_pixels = kMaxImagePixels);
 
+  /// Reads how opaque the pixels of a picture are: its alpha where that is below 1 somewhere, else,
+  /// if asked for, the mean of red, green and blue as they are stored.
+  /// @param grey  whether red, green and blue say it in a picture without alpha
+  /// @return the share of light that each pixel stops, for R, G and B alike; nothing where all
+  ///         pixels stop all of it
+  /// @throws as read()
+  [[nodiscard]] std::optional<Texture> read_opacity(const ByteRange& bytes, const std::string& name,
+                                                    bool grey,
+                                                    std::uint64_t max_pixels = kMaxImagePixels);
+
   /// Returns the memory of the textures and of the cache, bytes.
   [[nodiscard]] std::uint64_t bytes() const noexcept { return held_ + cache_bytes(); }
   /// Returns the memory of the cache of tiles, bytes; 0 as long as all textures are in memory.
@@ -108,6 +120,8 @@ class TextureStore : public std::enable_shared_from_this<TextureStore> {
   class Tiles;
   TextureStore(std::uint64_t memory_bytes, std::filesystem::path directory);
 
+  /// Returns what the next picture may ask for.
+  [[nodiscard]] PictureLimits limits(std::uint64_t max_pixels) const;
   [[nodiscard]] Texture load(RowReader& reader);
 
   std::uint64_t memory_bytes_;

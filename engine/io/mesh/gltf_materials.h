@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -29,6 +30,7 @@ struct TexturePlace {
 struct GltfMaterial {
   std::size_t index = 0;  ///< of the material in the soup
   TexturePlace place;
+  bool alpha = false;  ///< whether alpha counts
 };
 
 /// Reads the materials that a file uses, each once, into the soups that use them.
@@ -56,7 +58,11 @@ class GltfMaterials {
   [[nodiscard]] TextureWrap wrap_of(const Json& info) const;
   glm::dvec3 mean_of(const std::shared_ptr<const Texture>& image);
   std::shared_ptr<const Texture> load_texture(const Json& info);
+  std::shared_ptr<const Texture> load_opacity(const Json& info);
   std::shared_ptr<const Texture> load_image(std::uint64_t source);
+  std::optional<std::uint64_t> source_of(const Json& info);
+  [[nodiscard]] std::string uri_of(const Json& image) const;
+  [[nodiscard]] std::uint64_t view_of(const Json& image) const;
 
   GltfDocument& document_;
   TextureLoader& textures_;
@@ -64,6 +70,7 @@ class GltfMaterials {
   std::map<std::uint64_t, GltfMaterial> materials_;                        ///< by index in the file
   std::map<std::uint64_t, std::shared_ptr<const Texture>> images_;         ///< by index in the file
   std::map<std::uint64_t, std::shared_ptr<const Texture>> image_of_view_;  ///< by bufferView
+  std::map<std::uint64_t, std::shared_ptr<const Texture>> opacity_of_;     ///< by index in the file
   std::map<std::shared_ptr<const Texture>, glm::dvec3> means_;
   std::set<std::uint64_t> textures_left_out_;  ///< indices in the file
 };

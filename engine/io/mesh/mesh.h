@@ -36,7 +36,7 @@ struct TextureWrap {
   bool operator==(const TextureWrap&) const = default;
 };
 
-/// A material: diffuse reflectance and emission of a set of triangles.
+/// A material: diffuse reflectance, emission and opacity of a set of triangles.
 struct Material {
   std::string name;        ///< as the file has it; may be empty
   glm::vec3 albedo{0.5f};  ///< linear RGB; multiplied by the texture if there is one
@@ -48,6 +48,15 @@ struct Material {
   TextureWrap wrap;                                 ///< of `texture`
   TextureWrap emission_wrap;                        ///< of `emission_texture`
   bool double_sided = false;                        ///< the back reflects as the front does
+  /// The share of light that the surface stops, from 0 to 1; multiplied by `opacity_texture` if
+  /// there is one. The rest goes straight through.
+  float opacity = 1;
+  std::shared_ptr<const Texture> opacity_texture;  ///< R = G = B; has the wrap of `texture`
+  /// The least opacity where there is a surface, which then stops all light; 0: as `opacity` says.
+  float opacity_cutoff = 0;
+
+  /// Says whether the surface stops all light everywhere.
+  [[nodiscard]] bool is_opaque() const noexcept { return opacity >= 1 && !opacity_texture; }
 };
 
 /// The maximum number of materials of a mesh.
@@ -107,7 +116,7 @@ struct MeshRoom {
   std::filesystem::path temp_directory = ".";
   /// Reads the textures; null: they stay in memory.
   std::shared_ptr<TextureStore> textures;
-  /// Takes the place of all materials of the mesh, which keep their names and sides.
+  /// Takes the place of all materials of the mesh, which keep their names, sides and opacity.
   std::optional<Material> material;
   /// Whether only fronts reflect in formats that say nothing of sides: all but glTF.
   bool one_sided = false;
@@ -147,13 +156,16 @@ struct MeshFile {
 /// is checked. If only some triangles have normals, the others get flat ones.
 ///
 /// Albedo is Kd of MTL and the base colour of glTF, emission Ke and emissiveFactor, all linear,
-/// with their textures. A map_Ke without Ke is the emission itself. A texture that is missing or
+/// with their textures. A map_Ke without Ke is the emission itself. Opacity is d, or 1 - Tr, and
+/// map_d of MTL, by its alpha or else by its grey; in glTF it is the alpha of the base colour where
+/// alphaMode is MASK or BLEND. A texture that is missing or
 /// damaged causes a warning, and the plain colour takes its place. Colours of vertices multiply it:
 /// COLOR_0 of glTF, linear; red, green and blue of PLY and of what follows the coordinates in OBJ,
 /// on the sRGB curve. Vertices without a colour are white, and so is a material that is not given
 /// where there are colours. Materials of glTF say whether their backs reflect; those of other
 /// formats do on both sides unless `room` says otherwise. What a file asks for beyond that (skins,
-/// transparency, extensions of glTF) is left out and told by a warning; morph targets are left out.
+/// the alpha of vertices, extensions of glTF) is left out and told by a warning; morph targets are
+/// left out.
 /// @param room  for the mesh; one that takes more memory than that is left on the disk
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not
 ///         finite; LimitError when the JSON of a glTF does not fit in memory; std::system_error

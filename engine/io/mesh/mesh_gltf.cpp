@@ -255,7 +255,7 @@ class GltfMesh {
     soup_.normals.grow(soup_.positions.size(), glm::vec3(0));
     add_uvs(attributes, positions.count, material);
     soup_.uvs.grow(soup_.positions.size(), glm::vec2(0));
-    add_colours(attributes, positions.count);
+    add_colours(attributes, positions.count, material);
     return positions.count;
   }
 
@@ -299,7 +299,7 @@ class GltfMesh {
   }
 
   // Adds the colours of vertices, whose positions are there; alpha is left out.
-  void add_colours(const Json& attributes, std::uint64_t count) {
+  void add_colours(const Json& attributes, std::uint64_t count, const GltfMaterial& material) {
     const auto index = document_.unsigned_at(attributes, "COLOR_0");
     if (!index) return;
     const Json& accessor = document_.at("accessors", *index);
@@ -308,6 +308,8 @@ class GltfMesh {
       return;
     }
     const bool has_alpha = accessor.contains("type") && accessor["type"] == "VEC4";
+    if (has_alpha && material.alpha)
+      warnings_.add(kAlphaLeftOut, "accessor " + std::to_string(*index));
     std::uint64_t vertex = soup_.positions.size() - count;
     document_.read(document_.find_elements(*index, has_alpha ? 4 : 3, count),
                    [&](std::span<const double> c) {

@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/io/image/byte_range.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -54,22 +55,39 @@ std::uint64_t TextureLoader::pixels_left() const {
   return std::min(most - pixels_, kMaxImagePixels);
 }
 
-std::shared_ptr<const Texture> TextureLoader::keep(Texture texture) {
-  pixels_ += texture.size();
-  return std::make_shared<const Texture>(std::move(texture));
+std::shared_ptr<const Texture> TextureLoader::keep(std::optional<Texture> texture) {
+  if (!texture) return nullptr;
+  pixels_ += texture->size();
+  return std::make_shared<const Texture>(std::move(*texture));
 }
 
 std::shared_ptr<const Texture> TextureLoader::load(const std::string& name) {
+  return load(name, loaded_,
+              [&](const ByteRange& bytes, const std::string& path) -> std::optional<Texture> {
+                return store_->read(bytes, path, pixels_left());
+              });
+}
+
+std::shared_ptr<const Texture> TextureLoader::load_opacity(const std::string& name, bool grey) {
+  return load(name, opacity_of_, [&](const ByteRange& bytes, const std::string& path) {
+    return store_->read_opacity(bytes, path, grey, pixels_left());
+  });
+}
+
+template <typename Read>
+std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Loaded& loaded,
+                                                   const Read& read) {
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
   // Normalise the name, because one file has many: a.png and ./a.png.
   const std::filesystem::path path = (directory_ / relative).lexically_normal();
-  const auto known = loaded_.find(path.string());
-  if (known != loaded_.end()) return known->second;
+  const auto known = loaded.find(path.string());
+  if (known != loaded.end()) return known->second;
   std::shared_ptr<const Texture> texture;
   try {
-    texture_bytes_ += InputFile(path).size();
-    texture = keep(store_->read(path, pixels_left()));
+    const InputFile file(path);
+    texture_bytes_ += file.size();
+    texture = keep(read(ByteRange(file, 0, file.size()), path.string()));
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const LimitError&) {
@@ -77,7 +95,7 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name) {
   } catch (const std::exception& error) {
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
-  return loaded_[path.string()] = std::move(texture);
+  return loaded[path.string()] = std::move(texture);
 }
 
 std::shared_ptr<const Texture> TextureLoader::decode(const std::string& name,
@@ -89,6 +107,17 @@ std::shared_ptr<const Texture> TextureLoader::decode(const std::string& name,
   } catch (const DataError& error) {
     warnings_.add(kTextureLeftOut, error.what());
     return nullptr;
+  }
+}
+
+std::shared_ptr<const Texture> TextureLoader::decode_opacity(const std::string& name,
+                                                             const ByteRange& bytes,
+                                                             std::uint64_t mesh_bytes) {
+  mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
+  try {
+    return keep(store_->read_opacity(bytes, name, false, pixels_left()));
+  } catch (const DataError&) {
+    return nullptr;  // the warning is that of its colours
   }
 }
 

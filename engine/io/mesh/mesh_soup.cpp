@@ -257,6 +257,10 @@ void MeshSoup::settle() {
       Material other = *room_.material;
       other.name = std::move(material.name);
       other.double_sided = material.double_sided;
+      other.opacity = material.opacity;
+      other.opacity_texture = std::move(material.opacity_texture);
+      other.opacity_cutoff = material.opacity_cutoff;
+      if (other.opacity_texture) other.wrap = material.wrap;
       material = std::move(other);
     }
     material.double_sided |= !room_.one_sided;

@@ -189,6 +189,10 @@ class TextureLoader {
   /// @param name  path relative to the directory, with / or \ between its parts
   /// @throws LimitError when the texture takes more memory to decode than it may
   [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name);
+  /// Returns how opaque the pixels of a file are, as TextureStore::read_opacity() does; null after
+  /// a warning, and where all of them are opaque.
+  /// @throws as load()
+  [[nodiscard]] std::shared_ptr<const Texture> load_opacity(const std::string& name, bool grey);
   /// Decodes a texture in bytes of the mesh's own files, or returns null after a warning. Unlike
   /// load(), each call makes a texture of its own.
   /// @param name        name of the texture, for the warning
@@ -197,12 +201,20 @@ class TextureLoader {
   [[nodiscard]] std::shared_ptr<const Texture> decode(const std::string& name,
                                                       const ByteRange& bytes,
                                                       std::uint64_t mesh_bytes);
+  /// Decodes the alpha of a texture that decode() reads, and returns null where all of it is 1, or
+  /// where decode() warns. @throws as load()
+  [[nodiscard]] std::shared_ptr<const Texture> decode_opacity(const std::string& name,
+                                                              const ByteRange& bytes,
+                                                              std::uint64_t mesh_bytes);
 
  private:
+  using Loaded = std::map<std::string, std::shared_ptr<const Texture>>;  // by path
+  template <typename Read>
+  std::shared_ptr<const Texture> load(const std::string& name, Loaded& loaded, const Read& read);
   /// Returns the number of pixels that the next texture may have.
   [[nodiscard]] std::uint64_t pixels_left() const;
   /// Counts the pixels of a texture and puts it on the heap.
-  std::shared_ptr<const Texture> keep(Texture texture);
+  std::shared_ptr<const Texture> keep(std::optional<Texture> texture);
 
   std::filesystem::path directory_;
   MeshWarnings& warnings_;
@@ -211,7 +223,8 @@ class TextureLoader {
   std::uint64_t pixels_ = 0;         // of all textures so far
   std::uint64_t texture_bytes_ = 0;  // size of the files that load() read
   std::uint64_t mesh_bytes_ = 0;     // size of the mesh's own files
-  std::map<std::string, std::shared_ptr<const Texture>> loaded_;
+  Loaded loaded_;
+  Loaded opacity_of_;
 };
 
 // The readers of each format, as read_mesh() describes them.

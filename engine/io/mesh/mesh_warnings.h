@@ -33,8 +33,8 @@ inline constexpr WarningKind kLibraryLeftOut{
 inline constexpr WarningKind kMaterialUndefined{"a material is not defined and becomes plain grey",
                                                 "materials are not defined and become plain grey"};
 inline constexpr WarningKind kAlphaLeftOut{
-    "a material is solid, because its transparency is left out",
-    "materials are solid, because their transparency is left out"};
+    "the alpha of a list of vertex colours is left out",
+    "lists of vertex colours lose their alpha, which is left out"};
 inline constexpr WarningKind kColoursLeftOut{
     "colours of vertices are left out, because they are stored sparsely",
     "lists of colours of vertices are left out, because they are stored sparsely"};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -53,6 +54,15 @@ class MtlReader {
     } else if (keyword == "Ke") {
       read_colour(words, std::numeric_limits<float>::max(), current_->emission);
       emission_given_ = true;
+    } else if (keyword == "d" || keyword == "Tr") {
+      const auto value = parse_number(words.next());
+      if (!value || std::isnan(*value)) return;
+      const auto share = static_cast<float>(std::clamp(*value, 0.0, 1.0));
+      current_->opacity = keyword == "d" ? share : 1 - share;
+    } else if (keyword == "map_d") {
+      TextureWrap wrap;  // that of the colour holds for both
+      const std::string name = file_name(words, wrap);
+      if (!name.empty()) current_->opacity_texture = textures_.load_opacity(name, true);
     } else if (keyword == "map_Kd") {
       const std::string name = file_name(words, current_->wrap);
       if (!name.empty()) current_->texture = textures_.load(name);

@@ -57,8 +57,10 @@ class Cutter {
   [[nodiscard]] double texels(const SubTriangle& part) const {
     const glm::dvec2 a(on_texture(part.uv[0])), b = glm::dvec2(on_texture(part.uv[1])) - a,
                                                 c = glm::dvec2(on_texture(part.uv[2])) - a;
-    const Texture& image = *material_.emission_texture;
-    const double area = 0.5 * std::abs(b.x * c.y - b.y * c.x) * image.width() * image.height();
+    double size = 0;  // of the larger texture, pixels
+    for (const auto* image : {&material_.emission_texture, &material_.opacity_texture})
+      if (*image) size = std::max(size, static_cast<double>((*image)->size()));
+    const double area = 0.5 * std::abs(b.x * c.y - b.y * c.x) * size;
     return std::isfinite(area) ? area : 0;
   }
 
@@ -69,9 +71,10 @@ class Cutter {
     Range range{.low = glm::vec3(std::numeric_limits<float>::max())};
     const auto add = [&](double u, double v) {
       const glm::dvec2 at = (1 - u - v) * part.uv[0] + u * part.uv[1] + v * part.uv[2];
-      const glm::vec3 light =
-          material_.emission *
-          sample_texture(*material_.emission_texture, on_texture(at), material_.emission_wrap);
+      const glm::vec2 uv = on_texture(at);
+      glm::vec3 light = material_.emission * opacity_at(material_, uv);
+      if (material_.emission_texture)
+        light *= sample_texture(*material_.emission_texture, uv, material_.emission_wrap);
       range.mean += glm::dvec3(light);
       range.low = glm::min(range.low, light);
       range.high = glm::max(range.high, light);
@@ -125,7 +128,8 @@ glm::vec3 brightest(const Texture& image) {
 std::vector<Emitter> emitters_of(const Mesh& mesh) {
   const auto is_textured = [&](std::uint16_t material) {
     const Material& m = mesh.materials[material];
-    return m.emission != glm::vec3(0) && m.emission_texture && !mesh.uvs.empty();
+    return m.emission != glm::vec3(0) && (m.emission_texture || m.opacity_texture) &&
+           !mesh.uvs.empty();
   };
   const auto textured =
       static_cast<std::size_t>(std::ranges::count_if(mesh.material_of, is_textured));
@@ -134,19 +138,20 @@ std::vector<Emitter> emitters_of(const Mesh& mesh) {
   std::vector<glm::vec3> most(mesh.materials.size());
   for (std::size_t i = 0; textured > 0 && i < most.size(); ++i) {
     const Material& m = mesh.materials[i];
+    most[i] = glm::vec3(1);
     if (m.emission != glm::vec3(0) && m.emission_texture) most[i] = brightest(*m.emission_texture);
   }
   std::vector<Emitter> emitters;
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const std::uint16_t material = mesh.material_of[i];
-    const glm::vec3& radiance = mesh.materials[material].emission;
-    if (radiance == glm::vec3(0)) continue;
+    const Material& of = mesh.materials[material];
+    if (of.emission == glm::vec3(0)) continue;
     const auto& c = mesh.triangles[i];
     if (is_textured(material)) {
       Cutter(mesh, static_cast<std::uint32_t>(i), most[material], depth, emitters);
     } else {
-      emitters.push_back(
-          {{mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]}, radiance});
+      emitters.push_back({{mesh.positions[c[0]], mesh.positions[c[1]], mesh.positions[c[2]]},
+                          of.emission * opacity_at(mesh, static_cast<std::uint32_t>(i), {})});
     }
   }
   return emitters;

@@ -109,7 +109,8 @@ std::uint64_t texture_bytes(const std::vector<Material>& materials) {
   std::set<const TextureStore*> stores{nullptr};
   std::uint64_t bytes = 0;
   for (const Material& material : materials) {
-    for (const Texture* texture : {material.texture.get(), material.emission_texture.get()}) {
+    for (const Texture* texture : {material.texture.get(), material.emission_texture.get(),
+                                   material.opacity_texture.get()}) {
       if (!textures.insert(texture).second) continue;
       bytes += texture->bytes();
       if (stores.insert(texture->store()).second) bytes += texture->store()->cache_bytes();

@@ -50,7 +50,7 @@ class PatchSampler {
   PatchSampler(const RayScene& scene, const DirectLight* light, const LightSampling& rays);
 
   /// Returns the surfels of a patch. The sum of their 2 r^2 is the area of the patch less that of
-  /// groups that are buried.
+  /// groups that are buried; surfels of what is not opaque are smaller, so that they cover as much.
   /// @param patch  has kPointsPerSurfel points for each surfel
   [[nodiscard]] std::vector<Surfel> sample(const SurfacePatch& patch) const;
 

@@ -3,8 +3,8 @@
 #include "engine/scene/sampling/sampler.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "engine/base/error.h"
@@ -105,33 +105,40 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
                  const Executor& executor) {
   const Mesh& mesh = scene.mesh();
   const double area = sampled_area(mesh);
-  const bool two_sided = std::ranges::any_of(mesh.materials, &Material::double_sided);
-  if (!two_sided || !(area > 0)) return area;
-  // Look at places on double-sided materials
+  // Look at places where a side may be dark, or light may go through
+  const auto is_clear = [&](std::uint32_t triangle) {
+    return !mesh.materials[mesh.material_of[triangle]].is_opaque();
+  };
   constexpr std::uint32_t kPlaces = 4096;
   std::vector<std::uint32_t> triangles;
+  double looked_at = 0;  // area of the sides
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (sides_of(mesh, i) == 2) triangles.push_back(i);
+    if (sides_of(mesh, i) == 1 && !is_clear(i)) continue;
+    triangles.push_back(i);
+    looked_at += sides_of(mesh, i) * whole_triangle(mesh, i).area();
   }
   const PlacesByArea places(scene, triangles, 0);
   if (!(places.area() > 0)) return area;
   const PatchSampler sampler(scene, &light, rays);
-  std::atomic<std::uint32_t> hidden = 0;  // sides
+  std::vector<float> seen(kPlaces);  // sides, times the opacity
   executor.for_each(kPlaces, [&](std::size_t i, unsigned) {
     const SurfaceHit at = places.place(static_cast<std::uint32_t>(i), kPlaces);
+    if (at.opacity == 0) return;
+    seen[i] = at.opacity;
+    if (sides_of(mesh, at.triangle) == 1) return;
     // A side is looked at as often as a surfel has points; of two dark ones the front stays
-    unsigned dark = 0;
+    unsigned sides = 0;
     for (const bool front : {true, false}) {
-      bool seen = false;
-      for (unsigned k = 0; k < PatchSampler::kLitPoints && !seen; ++k)
-        seen = sampler.is_seen(at, front, 8 * i + 2 * k + (front ? 1 : 0));
-      dark += seen ? 0 : 1;
+      bool lit = false;
+      for (unsigned k = 0; k < PatchSampler::kLitPoints && !lit; ++k)
+        lit = sampler.is_seen(at, front, 8 * i + 2 * k + (front ? 1 : 0));
+      sides += lit ? 1 : 0;
     }
-    hidden += std::min(dark, 1U);
+    seen[i] *= static_cast<float>(std::max(sides, 1U));
   });
   constexpr double kLeast = 0.05;  // of the area: more would be finer than anyone asks for
-  const double share = static_cast<double>(hidden) / (2.0 * kPlaces);
-  return std::max(kLeast * area, area - share * 2 * places.area());
+  const double sides = std::accumulate(seen.begin(), seen.end(), 0.0) / kPlaces;
+  return std::max(kLeast * area, area - looked_at + sides * places.area());
 }
 
 }  // namespace ptc

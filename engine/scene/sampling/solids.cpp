@@ -59,7 +59,8 @@ std::uint32_t root(std::span<std::uint32_t> parents, std::uint32_t v) {
   return v;
 }
 
-// Marks the surfaces that have an edge used more often in one direction than in the other.
+// Marks the surfaces that have an edge used more often in one direction than in the other, or a
+// part that light passes through.
 void mark_open(const Mesh& mesh, std::span<const std::uint32_t> first,
                std::span<std::uint32_t> parents, std::vector<bool>& open) {
   std::vector<std::uint64_t> up, down;  // edges towards the greater vertex, and the others
@@ -77,6 +78,10 @@ void mark_open(const Mesh& mesh, std::span<const std::uint32_t> first,
   const auto mark = [&](std::uint64_t edge) {
     open[root(parents, static_cast<std::uint32_t>(edge >> 32))] = true;
   };
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    if (!mesh.materials[mesh.material_of[i]].is_opaque())
+      open[root(parents, first[mesh.triangles[i][0]])] = true;
+  }
   std::size_t i = 0, j = 0;
   while (i < up.size() || j < down.size()) {
     if (j == down.size() || (i < up.size() && up[i] < down[j])) {

@@ -29,6 +29,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/low_discrepancy.h"
+#include "engine/scene/texture.h"
 #include "format/morton.h"
 
 namespace ptc {
@@ -351,6 +352,29 @@ std::uint64_t SurfacePatches::surfels() const noexcept {
   return surfels_of(weights_.back());
 }
 
+namespace {
+
+// Takes points out of a patch where nothing stops light, and makes the area of the others what they
+// stop. The patch has fewer surfels by as much.
+void keep_opaque(const Mesh& mesh, SurfacePatch& patch) {
+  if (std::ranges::all_of(mesh.materials, &Material::is_opaque)) return;
+  double before = 0, left = 0;
+  for (SurfacePoint& point : patch.points) {
+    before += point.area;
+    point.area *= static_cast<double>(opacity_at(mesh, point.triangle, point.uv));
+    left += point.area;
+  }
+  if (left == before) return;
+  std::erase_if(patch.points, [](const SurfacePoint& point) { return point.area == 0; });
+  const double share = left / before;
+  patch.area *= share;
+  patch.surfels = std::min<std::uint64_t>(
+      patch.points.size(),
+      static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(patch.surfels))));
+}
+
+}  // namespace
+
 SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfel) const {
   // Cut the patch into parts.
   Parts parts(mesh_);
@@ -371,6 +395,7 @@ SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfe
   Spread spread(parts, result.first * points_per_surfel, result.points);
   parts.visit_sorted([&](const Part& part) { spread.walk(part); });
   spread.finish();
+  keep_opaque(mesh_, result);
   return result;
 }
 

@@ -105,7 +105,8 @@ class SurfacePatches {
   /// face, and along the Z-curve, and sets points at equal steps of the weight.
   /// @param patch              below size()
   /// @param points_per_surfel  number of points for each surfel
-  /// @return  the points in that order; their areas add up to the area of one side of the patch
+  /// @return  the points in that order, without those where nothing stops light; their areas, times
+  ///          the opacity there, add up to what one side of the patch stops
   [[nodiscard]] SurfacePatch spread(std::size_t patch, unsigned points_per_surfel) const;
 
  private:

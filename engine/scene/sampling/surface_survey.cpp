@@ -15,6 +15,7 @@
 #include "engine/base/numbers.h"
 #include "engine/scene/sampling/solids.h"
 #include "engine/scene/sampling/sub_triangle.h"
+#include "engine/scene/texture.h"
 
 namespace ptc {
 namespace {
@@ -92,10 +93,27 @@ glm::dvec3 place_on(const SubTriangle& shape, double golden) {
   return a + std::sqrt(golden) * 0.5 * ((b - a) + (c - a));
 }
 
+/// Returns about the share of light that a triangle stops, from a few of its places.
+double mean_opacity(const MeshTriangle& triangle, const Material& material) {
+  if (material.is_opaque()) return 1;
+  constexpr unsigned kSide = 4;  // places along an edge
+  const auto& [a, b, c] = triangle.uvs;
+  double sum = 0;
+  for (unsigned i = 0; i < kSide; ++i) {
+    for (unsigned j = 0; j + i < kSide; ++j) {
+      const float u = (static_cast<float>(i) + 1.0F / 3) / kSide,
+                  v = (static_cast<float>(j) + 1.0F / 3) / kSide;
+      sum += static_cast<double>(opacity_at(material, a + u * (b - a) + v * (c - a)));
+    }
+  }
+  return sum / (kSide * (kSide + 1) / 2);
+}
+
 /// What was found of one part.
 struct PartSurvey {
-  double area = 0;   ///< one side only
-  double backs = 0;  ///< area of double-sided materials
+  double extent = 0;  ///< area of one side
+  double area = 0;    ///< of one side, times the opacity
+  double backs = 0;   ///< that of double-sided materials
   bool solid = false;
 };
 
@@ -107,19 +125,23 @@ PartSurvey survey_part(const MeshParts& parts, std::size_t part, SurfaceSurvey& 
                        const Each& each) {
   PartSurvey found;
   ClosedTest closed;
+  bool opaque = true;
   parts.visit(part, [&](std::span<const MeshTriangle> triangles) {
     all.triangles += triangles.size();
     for (const MeshTriangle& triangle : triangles) {
       const Material& material = parts.materials()[triangle.material];
       all.emits |= material.emission != glm::vec3(0);
       const SubTriangle shape = whole_triangle(triangle.positions);
-      found.area += shape.area();
-      if (material.double_sided) found.backs += shape.area();
+      const double area = shape.area() * mean_opacity(triangle, material);
+      found.extent += shape.area();
+      found.area += area;
+      if (material.double_sided) found.backs += area;
       closed.add(triangle, shape);
+      opaque &= material.is_opaque();
       each(shape);
     }
   });
-  found.solid = closed.is_solid();
+  found.solid = closed.is_solid() && opaque;
   return found;
 }
 
@@ -228,8 +250,10 @@ SurfaceSurvey survey(MeshParts& parts, std::size_t places, bool lamps) {
   }
   // Let what is closed have one side
   found.keeps_sides = lamps || found.emits;
+  constexpr double kLeast = 0.05;  // of the extent: more would be finer than anyone asks for
   const auto counts = [&](const PartSurvey& part) {
-    return part.area + (part.solid && !found.keeps_sides ? 0 : part.backs);
+    const double area = part.area + (part.solid && !found.keeps_sides ? 0 : part.backs);
+    return std::max(area, kLeast * part.extent);
   };
   for (std::size_t part = 0; part < of_parts.size(); ++part) {
     if (of_parts[part].solid && !found.keeps_sides) parts.close(part);
