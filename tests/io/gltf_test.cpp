@@ -476,11 +476,19 @@ TEST_CASE("gltf: alpha counts where a material masks or blends", "[io][gltf]") {
   CHECK(blend.opacity_cutoff == 0);
   CHECK_FALSE(blend.opacity_texture);
   CHECK(read(R"({"alphaMode": "MASK", "alphaCutoff": 0.75})").opacity_cutoff == 0.75F);
-  // A picture in the buffer, twice
-  json["images"][0] = {{"uri", "data:image/png;base64,AAAA"}};
+  CHECK(read(R"({"alphaMode": "MASK", "alphaCutoff": 0, "pbrMetallicRoughness": {
+      "baseColorFactor": [1, 1, 1, 0]}})")
+            .is_opaque());
+  CHECK(read(R"({"alphaMode": "MASK", "alphaCutoff": 1.5})").opacity == 0);
+  // A picture that cannot be had is told once
+  json["images"] = Json::parse(R"([{"uri": "none.png"}])");
   json["materials"] = Json::parse(R"([{"alphaMode": "MASK", "pbrMetallicRoughness": {
       "baseColorTexture": {"index": 0}}}])");
-  CHECK(files.read(json).warnings.size() == 1);  // that it is no picture, once
+  const MeshFile missing = files.read(json);
+  REQUIRE(missing.warnings.size() == 1);
+  CHECK_THAT(missing.warnings[0], Contains("a texture is left out"));
+  json["images"][0] = {{"uri", "data:image/png;base64,AAAA"}};
+  CHECK(files.read(json).warnings.size() == 1);
 }
 
 TEST_CASE("gltf: lights stand and shine as their nodes do", "[io][gltf]") {

@@ -29,8 +29,12 @@ void GltfMaterials::read_material(const Json& json, Material& material, GltfMate
   const auto mode = json.find("alphaMode");
   if (mode != json.end() && mode->is_string() && *mode != "OPAQUE") {
     made.alpha = true;
-    if (*mode == "MASK")
-      material.opacity_cutoff = static_cast<float>(document_.number_at(json, "alphaCutoff", 0.5));
+    if (*mode == "MASK") {
+      const double cutoff = document_.number_at(json, "alphaCutoff", 0.5);
+      made.alpha = cutoff > 0;  // or else every alpha reaches it
+      material.opacity_cutoff = static_cast<float>(std::max(cutoff, 0.0));
+      if (cutoff > 1) material.opacity = 0;  // none does
+    }
   }
   if (const Json* const old =
           GltfDocument::extension(json, "KHR_materials_pbrSpecularGlossiness")) {
@@ -48,7 +52,7 @@ void GltfMaterials::read_base(const Json& json, const char* factor, const char* 
       material.albedo[i] =
           static_cast<float>(std::clamp((*colour)[static_cast<std::size_t>(i)], 0.0, 1.0));
     }
-    if (made.alpha) material.opacity = static_cast<float>(std::clamp((*colour)[3], 0.0, 1.0));
+    if (made.alpha) material.opacity *= static_cast<float>(std::clamp((*colour)[3], 0.0, 1.0));
   }
   const Json* const info = GltfDocument::member(json, texture);
   if (info == nullptr) return;

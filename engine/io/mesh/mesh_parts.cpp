@@ -83,6 +83,7 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Load
   const std::filesystem::path path = (directory_ / relative).lexically_normal();
   const auto known = loaded.find(path.string());
   if (known != loaded.end()) return known->second;
+  if (failed_.contains(path.string())) return nullptr;
   std::shared_ptr<const Texture> texture;
   try {
     const InputFile file(path);
@@ -93,6 +94,7 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Load
   } catch (const LimitError&) {
     throw;
   } catch (const std::exception& error) {
+    failed_.insert(path.string());
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
   return loaded[path.string()] = std::move(texture);

@@ -15,6 +15,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -225,6 +226,7 @@ class TextureLoader {
   std::uint64_t mesh_bytes_ = 0;     // size of the mesh's own files
   Loaded loaded_;
   Loaded opacity_of_;
+  std::set<std::string> failed_;  // paths that a warning has told
 };
 
 // The readers of each format, as read_mesh() describes them.
