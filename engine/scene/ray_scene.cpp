@@ -97,6 +97,14 @@ Stretch inside_box(const glm::dvec3& origin, const glm::dvec3& direction, const 
   return s;
 }
 
+// Returns a number in [0, 1) that depends on the ray and the triangle alone.
+float luck_of(const RTCRay& ray, std::uint32_t triangle) {
+  std::uint64_t luck = triangle;
+  for (const float part : {ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z})
+    luck = splitmix64(luck ^ std::bit_cast<std::uint32_t>(part));
+  return to_unit(static_cast<std::uint32_t>(luck >> 32));
+}
+
 // Checks the numbers of a material.
 void check_material(const Material& material, const char* field) {
   for (int k = 0; k < 3; ++k) {
@@ -152,8 +160,6 @@ struct RayScene::Impl {
   void build();
   // Embree's filter: takes out the hits that do not count. @pre its user data is an Impl
   static void let_through(const RTCFilterFunctionNArguments* arguments);
-  // Says whether a ray meets a triangle, rather than pass through it.
-  [[nodiscard]] bool stops(const RTCRay& ray, const RTCHit& hit) const;
   // Returns a ray in Embree's frame, or nothing when it cannot meet the mesh.
   [[nodiscard]] std::optional<LocalRay> localise(const glm::dvec3& origin,
                                                  const glm::vec3& direction, double near,
@@ -225,7 +231,7 @@ void RayScene::Impl::build() {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                              mesh.triangles.data(), 0, sizeof(mesh.triangles.front()),
                              mesh.triangles.size());
-  if (!std::ranges::all_of(mesh.materials, &Material::is_opaque)) {
+  if (!mesh.is_opaque()) {
     rtcSetGeometryUserData(geometry, this);
     rtcSetGeometryIntersectFilterFunction(geometry, let_through);
     rtcSetGeometryOccludedFilterFunction(geometry, let_through);
@@ -240,22 +246,17 @@ void RayScene::Impl::build() {
 }
 
 void RayScene::Impl::let_through(const RTCFilterFunctionNArguments* arguments) {
-  const Impl& self = *static_cast<const Impl*>(arguments->geometryUserPtr);
-  for (unsigned i = 0; i < arguments->N; ++i) {
+  const Mesh& mesh = static_cast<const Impl*>(arguments->geometryUserPtr)->mesh;
+  const unsigned count = arguments->N;
+  for (unsigned i = 0; i < count; ++i) {
     if (arguments->valid[i] == 0) continue;
-    const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, i);
-    const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
-    if (!self.stops(ray, hit)) arguments->valid[i] = 0;
+    const std::uint32_t triangle = RTCHitN_primID(arguments->hit, count, i);
+    const float opacity = opacity_at(
+        mesh, triangle, {RTCHitN_u(arguments->hit, count, i), RTCHitN_v(arguments->hit, count, i)});
+    if (opacity >= 1) continue;
+    if (luck_of(rtcGetRayFromRayN(arguments->ray, count, i), triangle) >= opacity)
+      arguments->valid[i] = 0;
   }
-}
-
-bool RayScene::Impl::stops(const RTCRay& ray, const RTCHit& hit) const {
-  const float opacity = opacity_at(mesh, hit.primID, {hit.u, hit.v});
-  if (opacity >= 1 || opacity <= 0) return opacity > 0;
-  std::uint64_t luck = hit.primID;
-  for (const float part : {ray.org_x, ray.org_y, ray.org_z, ray.dir_x, ray.dir_y, ray.dir_z})
-    luck = splitmix64(luck ^ std::bit_cast<std::uint32_t>(part));
-  return to_unit(static_cast<std::uint32_t>(luck >> 32)) < opacity;
 }
 
 // A ray that begins far outside starts where it enters the box around the mesh, so that its origin

@@ -56,8 +56,8 @@ void GltfMaterials::read_base(const Json& json, const char* factor, const char* 
   }
   const Json* const info = GltfDocument::member(json, texture);
   if (info == nullptr) return;
-  material.texture = load_texture(*info);
-  if (made.alpha) material.opacity_texture = load_opacity(*info);
+  material.texture = load_texture(*info, TextureUse::colour);
+  if (made.alpha) material.opacity_texture = load_texture(*info, TextureUse::alpha);
   material.wrap = wrap_of(*info);
   made.place = place_of(*info);
 }
@@ -102,7 +102,7 @@ void GltfMaterials::read_emission(const Json& json, Material& material, GltfMate
   }
   glm::dvec3 mean(1);
   const Json* const info = GltfDocument::member(json, "emissiveTexture");
-  const auto image = info == nullptr ? nullptr : load_texture(*info);
+  const auto image = info == nullptr ? nullptr : load_texture(*info, TextureUse::colour);
   if (image && (!material.texture || place_of(*info) == made.place)) {
     material.emission_texture = image;
     material.emission_wrap = wrap_of(*info);
@@ -131,73 +131,41 @@ glm::dvec3 GltfMaterials::mean_of(const std::shared_ptr<const Texture>& image) {
   return at->second;
 }
 
-std::shared_ptr<const Texture> GltfMaterials::load_texture(const Json& info) {
-  const auto source = source_of(info);
-  if (!source) return nullptr;
-  const auto [at, is_new] = images_.try_emplace(*source);
-  if (is_new) at->second = load_image(*source);
-  return at->second;
-}
-
-// Returns how opaque the pixels of a texture are, or null where all of them are opaque.
-std::shared_ptr<const Texture> GltfMaterials::load_opacity(const Json& info) {
-  const auto source = source_of(info);
-  if (!source) return nullptr;
-  const auto [at, is_new] = opacity_of_.try_emplace(*source);
-  if (!is_new) return at->second;
-  const Json& image = document_.at("images", *source);
-  const std::string label = "image " + std::to_string(*source);
-  if (const std::string uri = uri_of(image); !uri.empty()) {
-    if (!uri.starts_with("data:"))
-      return at->second = textures_.load_opacity(GltfDocument::file_name(uri), false);
-    const std::vector<std::byte> bytes = document_.decode_uri(uri);
-    return at->second = textures_.decode_opacity(label, ByteRange(bytes), document_.bytes_read());
-  }
-  return at->second = textures_.decode_opacity(label, document_.view(view_of(image)),
-                                               document_.bytes_read());
-}
-
-// Returns the index of a texture's image, or nothing after a warning.
-std::optional<std::uint64_t> GltfMaterials::source_of(const Json& info) {
+std::shared_ptr<const Texture> GltfMaterials::load_texture(const Json& info, TextureUse use) {
   const auto texture = document_.unsigned_at(info, "index");
   if (!texture) document_.fail("a texture has no index");
   const auto source = document_.unsigned_at(document_.at("textures", *texture), "source");
-  if (!source && textures_left_out_.insert(*texture).second) {
-    warnings_.add(kTextureLeftOut,
-                  "texture " + std::to_string(*texture) + ": it has no supported source");
+  if (!source) {
+    if (textures_left_out_.insert(*texture).second) {
+      warnings_.add(kTextureLeftOut,
+                    "texture " + std::to_string(*texture) + ": it has no supported source");
+    }
+    return nullptr;
   }
-  return source;
-}
-
-// Loads an image. Several images that are one file or one bufferView are loaded once.
-std::shared_ptr<const Texture> GltfMaterials::load_image(std::uint64_t source) {
-  const Json& image = document_.at("images", source);
-  const std::string label = "image " + std::to_string(source);
-  if (const std::string uri = uri_of(image); !uri.empty()) {
-    if (!uri.starts_with("data:")) return textures_.load(GltfDocument::file_name(uri));
-    const std::vector<std::byte> bytes = document_.decode_uri(uri);
-    return textures_.decode(label, ByteRange(bytes), document_.bytes_read());
-  }
-  const std::uint64_t view = view_of(image);
-  const auto [at, is_new] = image_of_view_.try_emplace(view);
-  if (is_new) {
-    const ByteRange bytes = document_.view(view);
-    at->second = textures_.decode(label, bytes, document_.bytes_read());
-  }
+  const auto [at, is_new] = images_.try_emplace({*source, use});
+  if (is_new) at->second = load_image(*source, use);
   return at->second;
 }
 
-// Returns the URI of an image; empty without one.
-std::string GltfMaterials::uri_of(const Json& image) const {
+// Loads an image. Several images that are one file or one bufferView are loaded once.
+std::shared_ptr<const Texture> GltfMaterials::load_image(std::uint64_t source, TextureUse use) {
+  const Json& image = document_.at("images", source);
   const auto uri = image.find("uri");
-  return uri != image.end() && uri->is_string() ? uri->get<std::string>() : "";
-}
-
-// Returns the bufferView of an image without a URI.
-std::uint64_t GltfMaterials::view_of(const Json& image) const {
+  const std::string label = "image " + std::to_string(source);
+  if (uri != image.end() && uri->is_string()) {
+    const std::string text = uri->get<std::string>();
+    if (!text.starts_with("data:")) return textures_.load(GltfDocument::file_name(text), use);
+    const std::vector<std::byte> bytes = document_.decode_uri(text);
+    return textures_.decode(label, ByteRange(bytes), document_.bytes_read(), use);
+  }
   const auto view = document_.unsigned_at(image, "bufferView");
   if (!view) document_.fail("an image has neither uri nor bufferView");
-  return *view;
+  const auto [at, is_new] = image_of_view_.try_emplace({*view, use});
+  if (is_new) {
+    const ByteRange bytes = document_.view(*view);
+    at->second = textures_.decode(label, bytes, document_.bytes_read(), use);
+  }
+  return at->second;
 }
 
 }  // namespace ptc

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
-#include <string>
+#include <utility>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -57,20 +57,16 @@ class GltfMaterials {
   [[nodiscard]] TexturePlace place_of(const Json& info) const;
   [[nodiscard]] TextureWrap wrap_of(const Json& info) const;
   glm::dvec3 mean_of(const std::shared_ptr<const Texture>& image);
-  std::shared_ptr<const Texture> load_texture(const Json& info);
-  std::shared_ptr<const Texture> load_opacity(const Json& info);
-  std::shared_ptr<const Texture> load_image(std::uint64_t source);
-  std::optional<std::uint64_t> source_of(const Json& info);
-  [[nodiscard]] std::string uri_of(const Json& image) const;
-  [[nodiscard]] std::uint64_t view_of(const Json& image) const;
+  std::shared_ptr<const Texture> load_texture(const Json& info, TextureUse use);
+  std::shared_ptr<const Texture> load_image(std::uint64_t source, TextureUse use);
 
   GltfDocument& document_;
   TextureLoader& textures_;
   MeshWarnings& warnings_;
-  std::map<std::uint64_t, GltfMaterial> materials_;                        ///< by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Texture>> images_;         ///< by index in the file
-  std::map<std::uint64_t, std::shared_ptr<const Texture>> image_of_view_;  ///< by bufferView
-  std::map<std::uint64_t, std::shared_ptr<const Texture>> opacity_of_;     ///< by index in the file
+  std::map<std::uint64_t, GltfMaterial> materials_;  ///< by index in the file
+  using Images = std::map<std::pair<std::uint64_t, TextureUse>, std::shared_ptr<const Texture>>;
+  Images images_;         ///< by index in the file
+  Images image_of_view_;  ///< by bufferView
   std::map<std::shared_ptr<const Texture>, glm::dvec3> means_;
   std::set<std::uint64_t> textures_left_out_;  ///< indices in the file
 };

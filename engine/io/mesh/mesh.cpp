@@ -107,6 +107,10 @@ bool Mesh::emits() const {
   return std::ranges::any_of(material_of, [&](std::size_t m) { return emits(materials[m]); });
 }
 
+bool Mesh::is_opaque() const {
+  return std::ranges::all_of(materials, &Material::is_opaque);
+}
+
 std::uint64_t bytes_of(const Mesh& mesh) noexcept {
   constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
                           kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);

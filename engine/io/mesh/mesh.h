@@ -81,6 +81,8 @@ struct Mesh {
   [[nodiscard]] Bounds bounds() const;
   /// Returns whether a triangle has a material that emits light.
   [[nodiscard]] bool emits() const;
+  /// Returns whether all materials stop all light everywhere.
+  [[nodiscard]] bool is_opaque() const;
 };
 
 /// Returns the memory of a mesh, bytes, without textures.

@@ -55,40 +55,28 @@ std::uint64_t TextureLoader::pixels_left() const {
   return std::min(most - pixels_, kMaxImagePixels);
 }
 
-std::shared_ptr<const Texture> TextureLoader::keep(std::optional<Texture> texture) {
+std::shared_ptr<const Texture> TextureLoader::read(const ByteRange& bytes, const std::string& name,
+                                                   TextureUse use) {
+  auto texture =
+      use == TextureUse::colour
+          ? std::optional(store_->read(bytes, name, pixels_left()))
+          : store_->read_opacity(bytes, name, use == TextureUse::alpha_or_grey, pixels_left());
   if (!texture) return nullptr;
   pixels_ += texture->size();
   return std::make_shared<const Texture>(std::move(*texture));
 }
 
-std::shared_ptr<const Texture> TextureLoader::load(const std::string& name) {
-  return load(name, loaded_,
-              [&](const ByteRange& bytes, const std::string& path) -> std::optional<Texture> {
-                return store_->read(bytes, path, pixels_left());
-              });
-}
-
-std::shared_ptr<const Texture> TextureLoader::load_opacity(const std::string& name, bool grey) {
-  return load(name, opacity_of_, [&](const ByteRange& bytes, const std::string& path) {
-    return store_->read_opacity(bytes, path, grey, pixels_left());
-  });
-}
-
-template <typename Read>
-std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Loaded& loaded,
-                                                   const Read& read) {
+std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, TextureUse use) {
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
   // Normalise the name, because one file has many: a.png and ./a.png.
   const std::filesystem::path path = (directory_ / relative).lexically_normal();
-  const auto known = loaded.find(path.string());
-  if (known != loaded.end()) return known->second;
-  if (failed_.contains(path.string())) return nullptr;
-  std::shared_ptr<const Texture> texture;
+  const auto [at, is_new] = loaded_.try_emplace({path.string(), use});
+  if (!is_new || failed_.contains(path.string())) return at->second;
   try {
     const InputFile file(path);
     texture_bytes_ += file.size();
-    texture = keep(read(ByteRange(file, 0, file.size()), path.string()));
+    at->second = read(ByteRange(file, 0, file.size()), path.string(), use);
   } catch (const std::bad_alloc&) {
     throw;
   } catch (const LimitError&) {
@@ -97,29 +85,18 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Load
     failed_.insert(path.string());
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }
-  return loaded[path.string()] = std::move(texture);
+  return at->second;
 }
 
 std::shared_ptr<const Texture> TextureLoader::decode(const std::string& name,
                                                      const ByteRange& bytes,
-                                                     std::uint64_t mesh_bytes) {
+                                                     std::uint64_t mesh_bytes, TextureUse use) {
   mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
   try {
-    return keep(store_->read(bytes, name, pixels_left()));
+    return read(bytes, name, use);
   } catch (const DataError& error) {
-    warnings_.add(kTextureLeftOut, error.what());
+    if (use == TextureUse::colour) warnings_.add(kTextureLeftOut, error.what());
     return nullptr;
-  }
-}
-
-std::shared_ptr<const Texture> TextureLoader::decode_opacity(const std::string& name,
-                                                             const ByteRange& bytes,
-                                                             std::uint64_t mesh_bytes) {
-  mesh_bytes_ = std::max(mesh_bytes_, mesh_bytes);
-  try {
-    return keep(store_->read_opacity(bytes, name, false, pixels_left()));
-  } catch (const DataError&) {
-    return nullptr;  // the warning is that of its colours
   }
 }
 

@@ -167,6 +167,14 @@ TriangulationCounts triangulate(std::span<const glm::dvec3> polygon,
 [[nodiscard]] std::string reason_for(const std::string& name, const std::filesystem::path& path,
                                      const std::exception& error);
 
+/// What a texture is loaded for.
+enum class TextureUse : std::uint8_t {
+  colour,
+  /// How opaque its pixels are, as TextureStore::read_opacity() says.
+  alpha,
+  alpha_or_grey
+};
+
 /// Loads the textures of a mesh, each file once. A texture that cannot be loaded becomes a
 /// warning and a null pointer.
 ///
@@ -186,14 +194,11 @@ class TextureLoader {
         store_(store ? std::move(store) : TextureStore::make()),
         free_pixels_(free_pixels) {}
 
-  /// Returns the texture in a file, or null after a warning.
+  /// Returns the texture in a file; null after a warning, or for the opacity of an opaque one.
   /// @param name  path relative to the directory, with / or \ between its parts
   /// @throws LimitError when the texture takes more memory to decode than it may
-  [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name);
-  /// Returns how opaque the pixels of a file are, as TextureStore::read_opacity() does; null after
-  /// a warning, and where all of them are opaque.
-  /// @throws as load()
-  [[nodiscard]] std::shared_ptr<const Texture> load_opacity(const std::string& name, bool grey);
+  [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name,
+                                                    TextureUse use = TextureUse::colour);
   /// Decodes a texture in bytes of the mesh's own files, or returns null after a warning. Unlike
   /// load(), each call makes a texture of its own.
   /// @param name        name of the texture, for the warning
@@ -201,21 +206,15 @@ class TextureLoader {
   /// @throws as load()
   [[nodiscard]] std::shared_ptr<const Texture> decode(const std::string& name,
                                                       const ByteRange& bytes,
-                                                      std::uint64_t mesh_bytes);
-  /// Decodes the alpha of a texture that decode() reads, and returns null where all of it is 1, or
-  /// where decode() warns. @throws as load()
-  [[nodiscard]] std::shared_ptr<const Texture> decode_opacity(const std::string& name,
-                                                              const ByteRange& bytes,
-                                                              std::uint64_t mesh_bytes);
+                                                      std::uint64_t mesh_bytes,
+                                                      TextureUse use = TextureUse::colour);
 
  private:
-  using Loaded = std::map<std::string, std::shared_ptr<const Texture>>;  // by path
-  template <typename Read>
-  std::shared_ptr<const Texture> load(const std::string& name, Loaded& loaded, const Read& read);
   /// Returns the number of pixels that the next texture may have.
   [[nodiscard]] std::uint64_t pixels_left() const;
-  /// Counts the pixels of a texture and puts it on the heap.
-  std::shared_ptr<const Texture> keep(std::optional<Texture> texture);
+  /// Reads a texture, counts its pixels and puts it on the heap.
+  std::shared_ptr<const Texture> read(const ByteRange& bytes, const std::string& name,
+                                      TextureUse use);
 
   std::filesystem::path directory_;
   MeshWarnings& warnings_;
@@ -224,8 +223,7 @@ class TextureLoader {
   std::uint64_t pixels_ = 0;         // of all textures so far
   std::uint64_t texture_bytes_ = 0;  // size of the files that load() read
   std::uint64_t mesh_bytes_ = 0;     // size of the mesh's own files
-  Loaded loaded_;
-  Loaded opacity_of_;
+  std::map<std::pair<std::string, TextureUse>, std::shared_ptr<const Texture>> loaded_;
   std::set<std::string> failed_;  // paths that a warning has told
 };
 

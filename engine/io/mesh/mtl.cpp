@@ -62,7 +62,8 @@ class MtlReader {
     } else if (keyword == "map_d") {
       TextureWrap wrap;  // that of the colour holds for both
       const std::string name = file_name(words, wrap);
-      if (!name.empty()) current_->opacity_texture = textures_.load_opacity(name, true);
+      if (!name.empty())
+        current_->opacity_texture = textures_.load(name, TextureUse::alpha_or_grey);
     } else if (keyword == "map_Kd") {
       const std::string name = file_name(words, current_->wrap);
       if (!name.empty()) current_->texture = textures_.load(name);

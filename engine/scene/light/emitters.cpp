@@ -135,10 +135,9 @@ std::vector<Emitter> emitters_of(const Mesh& mesh) {
       static_cast<std::size_t>(std::ranges::count_if(mesh.material_of, is_textured));
   unsigned depth = 0;
   while (textured > 0 && (textured << (depth + 1)) <= kMaxPieces) ++depth;
-  std::vector<glm::vec3> most(mesh.materials.size());
+  std::vector<glm::vec3> most(mesh.materials.size(), glm::vec3(1));
   for (std::size_t i = 0; textured > 0 && i < most.size(); ++i) {
     const Material& m = mesh.materials[i];
-    most[i] = glm::vec3(1);
     if (m.emission != glm::vec3(0) && m.emission_texture) most[i] = brightest(*m.emission_texture);
   }
   std::vector<Emitter> emitters;

@@ -106,14 +106,11 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
   const Mesh& mesh = scene.mesh();
   const double area = sampled_area(mesh);
   // Look at places where a side may be dark, or light may go through
-  const auto is_clear = [&](std::uint32_t triangle) {
-    return !mesh.materials[mesh.material_of[triangle]].is_opaque();
-  };
   constexpr std::uint32_t kPlaces = 4096;
   std::vector<std::uint32_t> triangles;
   double looked_at = 0;  // area of the sides
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    if (sides_of(mesh, i) == 1 && !is_clear(i)) continue;
+    if (sides_of(mesh, i) == 1 && mesh.materials[mesh.material_of[i]].is_opaque()) continue;
     triangles.push_back(i);
     looked_at += sides_of(mesh, i) * whole_triangle(mesh, i).area();
   }
@@ -136,9 +133,8 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
     }
     seen[i] *= static_cast<float>(std::max(sides, 1U));
   });
-  constexpr double kLeast = 0.05;  // of the area: more would be finer than anyone asks for
   const double sides = std::accumulate(seen.begin(), seen.end(), 0.0) / kPlaces;
-  return std::max(kLeast * area, area - looked_at + sides * places.area());
+  return std::max(kLeastSeen * area, area - looked_at + sides * places.area());
 }
 
 }  // namespace ptc

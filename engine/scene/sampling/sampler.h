@@ -44,8 +44,13 @@ void check_sampling(const SamplingOptions& options);
 /// @throws RequestError when count is 0
 [[nodiscard]] double spacing_for(const Mesh& mesh, std::uint64_t count);
 
+/// The least share of a mesh's area that its spacing is found by. Less would make surfels finer
+/// than anyone asks for, without end where nothing of the mesh is seen.
+inline constexpr double kLeastSeen = 0.05;
+
 /// Returns the area of a mesh of which surfels come: sampled_area() less what is estimated to be
-/// buried of double-sided materials, from 4,096 places. Where there are none it is sampled_area().
+/// buried of double-sided materials, or to let light through, from 4,096 places. It is at least
+/// kLeastSeen of sampled_area().
 /// @param rays  shadow rays of each surfel
 [[nodiscard]] double seen_area(const DirectLight& light, const RayScene& scene,
                                const LightSampling& rays, const Executor& executor);

@@ -245,6 +245,25 @@ class Spread {
   const Part* part_ = nullptr;  // the last one of them
 };
 
+// Takes points out of a patch where nothing stops light, and makes the area of the others what they
+// stop. The patch has fewer surfels by as much.
+void keep_opaque(const Mesh& mesh, SurfacePatch& patch) {
+  if (mesh.is_opaque()) return;
+  double before = 0, left = 0;
+  for (SurfacePoint& point : patch.points) {
+    before += point.area;
+    point.area *= static_cast<double>(opacity_at(mesh, point.triangle, point.uv));
+    left += point.area;
+  }
+  if (left == before) return;
+  std::erase_if(patch.points, [](const SurfacePoint& point) { return point.area == 0; });
+  const double share = left / before;
+  patch.area *= share;
+  patch.surfels = std::min<std::uint64_t>(
+      patch.points.size(),
+      static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(patch.surfels))));
+}
+
 }  // namespace
 
 SurfacePatches::SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels)
@@ -351,29 +370,6 @@ void SurfacePatches::join(double surfels) {
 std::uint64_t SurfacePatches::surfels() const noexcept {
   return surfels_of(weights_.back());
 }
-
-namespace {
-
-// Takes points out of a patch where nothing stops light, and makes the area of the others what they
-// stop. The patch has fewer surfels by as much.
-void keep_opaque(const Mesh& mesh, SurfacePatch& patch) {
-  if (std::ranges::all_of(mesh.materials, &Material::is_opaque)) return;
-  double before = 0, left = 0;
-  for (SurfacePoint& point : patch.points) {
-    before += point.area;
-    point.area *= static_cast<double>(opacity_at(mesh, point.triangle, point.uv));
-    left += point.area;
-  }
-  if (left == before) return;
-  std::erase_if(patch.points, [](const SurfacePoint& point) { return point.area == 0; });
-  const double share = left / before;
-  patch.area *= share;
-  patch.surfels = std::min<std::uint64_t>(
-      patch.points.size(),
-      static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(patch.surfels))));
-}
-
-}  // namespace
 
 SurfacePatch SurfacePatches::spread(std::size_t patch, unsigned points_per_surfel) const {
   // Cut the patch into parts.

@@ -13,6 +13,7 @@
 #include <glm/matrix.hpp>
 
 #include "engine/base/numbers.h"
+#include "engine/scene/sampling/sampler.h"
 #include "engine/scene/sampling/solids.h"
 #include "engine/scene/sampling/sub_triangle.h"
 #include "engine/scene/texture.h"
@@ -250,10 +251,9 @@ SurfaceSurvey survey(MeshParts& parts, std::size_t places, bool lamps) {
   }
   // Let what is closed have one side
   found.keeps_sides = lamps || found.emits;
-  constexpr double kLeast = 0.05;  // of the extent: more would be finer than anyone asks for
   const auto counts = [&](const PartSurvey& part) {
     const double area = part.area + (part.solid && !found.keeps_sides ? 0 : part.backs);
-    return std::max(area, kLeast * part.extent);
+    return std::max(area, kLeastSeen * part.extent);
   };
   for (std::size_t part = 0; part < of_parts.size(); ++part) {
     if (of_parts[part].solid && !found.keeps_sides) parts.close(part);
