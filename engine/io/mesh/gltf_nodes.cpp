@@ -1,4 +1,5 @@
-// Nodes of glTF: transforms multiply on the way down from the roots of the default scene.
+// Nodes of glTF: transforms, which animations may set, multiply on the way down from the roots of
+// the default scene.
 #include "engine/io/mesh/gltf_nodes.h"
 
 #include <algorithm>
@@ -12,10 +13,10 @@
 #include <utility>
 
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/gltf_animation.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -26,26 +27,20 @@ using Json = GltfDocument::Json;
 constexpr char kLights[] = "KHR_lights_punctual";
 constexpr char kInstancing[] = "EXT_mesh_gpu_instancing";
 
-// Returns the matrix of a translation, a rotation (x, y, z, w) and a scale, applied from the last
-// to the first.
-glm::dmat4 matrix_of(std::span<const double> t, std::span<const double> r,
-                     std::span<const double> s) {
-  glm::dmat4 matrix = glm::mat4_cast(glm::normalize(glm::dquat(r[3], r[0], r[1], r[2])));
-  for (int i = 0; i < 3; ++i) matrix[i] *= s[static_cast<std::size_t>(i)];
-  matrix[3] = {t[0], t[1], t[2], 1};
-  return matrix;
-}
-
 class NodeWalk {
  public:
-  NodeWalk(GltfDocument& document, std::uint64_t memory_bytes, MeshWarnings& warnings)
+  NodeWalk(GltfDocument& document, GltfSearch search, std::optional<double> seconds,
+           std::uint64_t memory_bytes, MeshWarnings& warnings)
       : document_(document),
+        search_(search),
+        animation_(document, seconds, warnings),
         memory_bytes_(memory_bytes),
         warnings_(warnings),
         visited_(document.count("nodes")) {}
 
   GltfNodes walk() {
     walk_nodes();
+    found_.animation_seconds = animation_.end_seconds();
     return std::move(found_);
   }
 
@@ -81,12 +76,7 @@ class NodeWalk {
     const GltfDocument::Elements rotations = find("ROTATION", 4);
     const GltfDocument::Elements scales = find("SCALE", 3);
     if (!count) return add_use(mesh, world);
-    struct Parts {
-      std::array<double, 3> t{0, 0, 0};
-      std::array<double, 4> r{0, 0, 0, 1};
-      std::array<double, 3> s{1, 1, 1};
-    };
-    std::vector<Parts> parts(*count);
+    std::vector<GltfTransform> parts(*count);
     const auto read = [&](const GltfDocument::Elements& from, auto member) {
       if (from.components == 0) return;
       std::size_t at = 0;
@@ -94,10 +84,10 @@ class NodeWalk {
         std::ranges::copy(numbers, (parts[at++].*member).begin());
       });
     };
-    read(translations, &Parts::t);
-    read(rotations, &Parts::r);
-    read(scales, &Parts::s);
-    for (const Parts& p : parts) add_use(mesh, world * matrix_of(p.t, p.r, p.s));
+    read(translations, &GltfTransform::translation);
+    read(rotations, &GltfTransform::rotation);
+    read(scales, &GltfTransform::scale);
+    for (const GltfTransform& part : parts) add_use(mesh, world * part.matrix());
   }
 
   // Returns the nodes of the default scene or, in a file without scenes, those without a parent.
@@ -134,60 +124,68 @@ class NodeWalk {
 
   // Notes the meshes, cameras and lights of all nodes, parents before their children.
   void walk_nodes() {
-    std::vector<std::pair<std::uint64_t, glm::dmat4>> open;
-    const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent) {
-      std::ranges::reverse(nodes);  // the last one pushed is the next one read
-      for (const std::uint64_t node : nodes) open.emplace_back(node, parent);
+    struct Open {
+      std::uint64_t node;
+      glm::dmat4 parent;
+      bool parent_moves;
     };
-    push(root_nodes(), glm::dmat4(1));
+    std::vector<Open> open;
+    const auto push = [&](std::vector<std::uint64_t> nodes, const glm::dmat4& parent, bool moves) {
+      std::ranges::reverse(nodes);  // the last one pushed is the next one read
+      for (const std::uint64_t node : nodes) open.push_back({node, parent, moves});
+    };
+    push(root_nodes(), glm::dmat4(1), false);
     while (!open.empty()) {
-      const auto [index, parent] = open.back();
+      const auto [index, parent, parent_moves] = open.back();
       open.pop_back();
       const Json& node = document_.at("nodes", index);
       if (visited_[index]) {
         document_.fail("node " + std::to_string(index) + " has two parents or contains itself");
       }
       visited_[index] = true;
-      const glm::dmat4 world = parent * local_transform(node);
-      if (const auto mesh = document_.unsigned_at(node, "mesh")) {
-        if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
-          add_instances(*mesh, *instancing, world);
-        } else {
-          add_use(*mesh, world);
-        }
-      }
-      if (const auto camera = document_.unsigned_at(node, "camera")) add_camera(*camera, world);
-      if (const Json* const light = GltfDocument::extension(node, kLights))
-        add_light(*light, world);
-      push(node_list(node, "children"), world);
+      const GltfAnimation::Pose pose = animation_.pose(index);
+      const glm::dmat4 world = parent * pose.local;
+      const bool moves = parent_moves || pose.moves;
+      if (const auto camera = document_.unsigned_at(node, "camera"))
+        add_camera(*camera, node, world);
+      const bool shows = node.contains("mesh") || GltfDocument::extension(node, kLights) != nullptr;
+      found_.moves_mesh |= moves && shows;
+      if (search_ == GltfSearch::all) add_shown(node, world);
+      push(node_list(node, "children"), world, moves);
     }
   }
 
-  glm::dmat4 local_transform(const Json& node) const {
-    if (const auto m = document_.numbers_at<16>(node, "matrix")) {
-      glm::dmat4 matrix;
-      for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = (*m)[static_cast<std::size_t>(i)];
-      return matrix;
+  // Notes the mesh and the light of a node.
+  void add_shown(const Json& node, const glm::dmat4& world) {
+    if (const auto mesh = document_.unsigned_at(node, "mesh")) {
+      if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
+        add_instances(*mesh, *instancing, world);
+      } else {
+        add_use(*mesh, world);
+      }
     }
-    const auto t = document_.numbers_at<3>(node, "translation").value_or(std::array{0.0, 0.0, 0.0});
-    const auto r =
-        document_.numbers_at<4>(node, "rotation").value_or(std::array{0.0, 0.0, 0.0, 1.0});
-    const auto s = document_.numbers_at<3>(node, "scale").value_or(std::array{1.0, 1.0, 1.0});
-    return matrix_of(t, r, s);
+    if (const Json* const light = GltfDocument::extension(node, kLights)) add_light(*light, world);
+  }
+
+  // Returns the name of an object; empty if it has none.
+  static std::string name_of(const Json& object) {
+    const auto name = object.find("name");
+    return name == object.end() || !name->is_string() ? std::string() : name->get<std::string>();
   }
 
   // Adds a perspective camera, which looks along -z with y up (section 3.10).
-  void add_camera(std::uint64_t index, const glm::dmat4& world) {
-    const Json* const perspective =
-        GltfDocument::member(document_.at("cameras", index), "perspective");
+  void add_camera(std::uint64_t index, const Json& node, const glm::dmat4& world) {
+    const Json& json = document_.at("cameras", index);
+    const Json* const perspective = GltfDocument::member(json, "perspective");
     if (perspective == nullptr) return;
     const double vertical = document_.number_at(*perspective, "yfov", 0.7);
     const double aspect = document_.number_at(*perspective, "aspectRatio", 16.0 / 9);
-    const auto camera =
-        make_camera(glm::dvec3(world[3]), -glm::dvec3(world[2]), glm::dvec3(world[1]),
-                    2 * std::atan(std::tan(vertical / 2) * aspect));
+    auto camera = make_camera(glm::dvec3(world[3]), -glm::dvec3(world[2]), glm::dvec3(world[1]),
+                              2 * std::atan(std::tan(vertical / 2) * aspect));
     if (camera) {
-      found_.cameras.push_back(*camera);
+      camera->name = name_of(node);
+      if (camera->name.empty()) camera->name = name_of(json);
+      found_.cameras.push_back(std::move(*camera));
     } else if (cameras_left_out_.insert(index).second) {
       warnings_.add(kCameraLeftOut, "camera " + std::to_string(index));
     }
@@ -245,6 +243,8 @@ class NodeWalk {
   }
 
   GltfDocument& document_;
+  GltfSearch search_;
+  GltfAnimation animation_;
   std::uint64_t memory_bytes_;
   MeshWarnings& warnings_;
   GltfNodes found_;
@@ -254,9 +254,9 @@ class NodeWalk {
 
 }  // namespace
 
-GltfNodes walk_gltf_nodes(GltfDocument& document, std::uint64_t memory_bytes,
-                          MeshWarnings& warnings) {
-  return NodeWalk(document, memory_bytes, warnings).walk();
+GltfNodes walk_gltf_nodes(GltfDocument& document, GltfSearch search, std::optional<double> seconds,
+                          std::uint64_t memory_bytes, MeshWarnings& warnings) {
+  return NodeWalk(document, search, seconds, memory_bytes, warnings).walk();
 }
 
 }  // namespace ptc

@@ -134,6 +134,13 @@ MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room) {
       hint_at_content(path));
 }
 
+CameraFile read_cameras(const std::filesystem::path& path, std::optional<double> seconds,
+                        std::uint64_t memory_bytes) {
+  const std::string extension = lower_extension(path);
+  if (extension != ".gltf" && extension != ".glb") return {};
+  return read_gltf_cameras(path, seconds, memory_bytes);
+}
+
 void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, const char* field) {
   // Refuse what cannot be joined.
   if (!is_placement(Placement(transform))) {

@@ -96,6 +96,7 @@ struct MeshCamera {
   float horizontal_fov = 0.8f;  ///< radians
   /// Width and height of the picture, pixels; 0 where the file does not say.
   std::array<unsigned, 2> size{};
+  std::string name{};  ///< as the file has it; of glTF: of its node, else its own; may be empty
 };
 
 /// A light that a mesh file defines: one of glTF's KHR_lights_punctual.
@@ -122,6 +123,9 @@ struct MeshRoom {
   std::optional<Material> material;
   /// Whether only fronts reflect in formats that say nothing of sides: all but glTF.
   bool one_sided = false;
+  /// Time at which the animations of a glTF are shown, finite, seconds; empty: its nodes stand as
+  /// the file puts them.
+  std::optional<double> seconds{};
 };
 
 /// Where a mesh stands: an affine map of its positions to world positions. The first three columns
@@ -145,6 +149,10 @@ struct MeshFile {
   std::shared_ptr<const SpilledMesh> spilled;
   std::vector<MeshCamera> cameras;  ///< world coordinates
   std::vector<MeshLight> lights;    ///< world coordinates
+  /// Whether an animation moves, turns or scales a node at or below which a mesh or a light stands.
+  /// If not, meshes and lights are the same at all times, and without one.
+  bool moves_mesh = false;
+  double animation_seconds = 0;  ///< time of the last key of all animations; 0 without one
   /// The warnings about parts that were left out or replaced: one line for each kind, without the
   /// name of the file.
   std::vector<std::string> warnings;
@@ -168,11 +176,31 @@ struct MeshFile {
 /// formats do on both sides unless `room` says otherwise. What a file asks for beyond that (skins,
 /// the alpha of vertices, extensions of glTF) is left out and told by a warning; morph targets are
 /// left out.
+///
+/// All animations of a glTF are shown together, as exporters write one for each object. Where two
+/// of them move one property of a node, the first one counts. Before its first key and behind its
+/// last one a property keeps the value of that key. An animation that breaks a rule is an error
+/// when a time is shown, else a warning.
 /// @param room  for the mesh; one that takes more memory than that is left on the disk
 /// @throws DataError when the file is not a mesh, has no triangle, or has a position that is not
 ///         finite; LimitError when the JSON of a glTF does not fit in memory; std::system_error
+/// @pre    the time that `room` holds, if it does, is finite
 /// Memory: about 150 bytes per triangle during the call, but not more than `room` allows.
 [[nodiscard]] MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room = {});
+
+/// What read_cameras() finds in a mesh file.
+struct CameraFile {
+  std::vector<MeshCamera> cameras;  ///< world coordinates, in the order of read_mesh()
+  bool moves_mesh = false;          ///< as MeshFile
+  double animation_seconds = 0;     ///< as MeshFile
+};
+
+/// Reads the cameras of a glTF file and nothing of its meshes. Files of other formats have none.
+/// @param seconds       time at which animations are shown, as MeshRoom::seconds
+/// @param memory_bytes  cap on the memory of the JSON of the file
+/// @throws as read_mesh()
+[[nodiscard]] CameraFile read_cameras(const std::filesystem::path& path,
+                                      std::optional<double> seconds, std::uint64_t memory_bytes);
 
 /// Appends a transformed copy of `other` to `mesh`; both keep their materials. An empty mesh takes
 /// its origin from the copy, any other keeps its own. If only one of the two has normals or texture

@@ -75,7 +75,8 @@ class GltfMesh {
 
   MeshFile read() {
     check_extensions();
-    GltfNodes nodes = walk_gltf_nodes(document_, room_.memory_bytes, warnings_);
+    GltfNodes nodes =
+        walk_gltf_nodes(document_, GltfSearch::all, room_.seconds, room_.memory_bytes, warnings_);
     uses_ = std::move(nodes.uses);
     std::vector<PlacedMesh> placed;
     if (!copies_fit()) placed = read_placed();
@@ -93,6 +94,8 @@ class GltfMesh {
     file.cameras = std::move(nodes.cameras);
     file.warnings = warnings_.lines();
     file.lights = std::move(nodes.lights);
+    file.moves_mesh = nodes.moves_mesh;
+    file.animation_seconds = nodes.animation_seconds;
     return file;
   }
 
@@ -368,14 +371,30 @@ class GltfMesh {
   bool has_uvs_ = false;  // some primitive in the soup has texture coordinates
 };
 
-}  // namespace
-
-MeshFile read_gltf_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+// Reads something of a file, whose JSON may hold values of other types than it should.
+auto read_checked(const std::filesystem::path& path, const auto& read) {
   try {
-    return GltfMesh(path, room).read();
+    return read();
   } catch (const nlohmann::json::exception& error) {
     throw DataError(path.string() + ": " + error.what());
   }
+}
+
+}  // namespace
+
+MeshFile read_gltf_mesh(const std::filesystem::path& path, const MeshRoom& room) {
+  return read_checked(path, [&] { return GltfMesh(path, room).read(); });
+}
+
+CameraFile read_gltf_cameras(const std::filesystem::path& path, std::optional<double> seconds,
+                             std::uint64_t memory_bytes) {
+  return read_checked(path, [&] {
+    GltfDocument document(path, memory_bytes);
+    MeshWarnings warnings;  // read_mesh() tells them
+    GltfNodes nodes =
+        walk_gltf_nodes(document, GltfSearch::cameras, seconds, memory_bytes, warnings);
+    return CameraFile{std::move(nodes.cameras), nodes.moves_mesh, nodes.animation_seconds};
+  });
 }
 
 }  // namespace ptc

@@ -235,4 +235,9 @@ class TextureLoader {
 [[nodiscard]] MeshFile read_gltf_mesh(const std::filesystem::path& path, const MeshRoom& room);
 [[nodiscard]] MeshFile read_stl_mesh(const std::filesystem::path& path, const MeshRoom& room);
 
+/// Reads the cameras of a glTF, as read_cameras() describes it.
+[[nodiscard]] CameraFile read_gltf_cameras(const std::filesystem::path& path,
+                                           std::optional<double> seconds,
+                                           std::uint64_t memory_bytes);
+
 }  // namespace ptc

@@ -43,6 +43,12 @@ inline constexpr WarningKind kExtensionLeftOut{"an extension of glTF is left out
 inline constexpr WarningKind kSkinLeftOut{
     "a skin is left out and its mesh keeps the pose in which it is stored",
     "skins are left out and their meshes keep the pose in which they are stored"};
+inline constexpr WarningKind kMorphLeftOut{
+    "an animation of morph targets is left out and its mesh keeps the shape in which it is stored",
+    "animations of morph targets are left out and their meshes keep the shapes in which they are "
+    "stored"};
+inline constexpr WarningKind kAnimationLeftOut{"a part of an animation is left out",
+                                               "parts of animations are left out"};
 inline constexpr WarningKind kLightLeftOut{
     "a light is left out because it has no place or no direction",
     "lights are left out because they have no place or no direction"};
