@@ -15,9 +15,20 @@
 #include "fuzz/memory_file.h"
 #include "fuzz/require.h"
 
+/// Checks a camera at its keys, between them and around them.
+static void check_moving(const ptc::SceneCamera& camera) {
+  ptc::fuzz::require(!camera.keys.empty());
+  for (const auto& [frame, at_key] : camera.keys) {
+    for (const double at : {frame - 0.5, frame, frame + 0.5}) {
+      const ptc::MeshCamera seen = ptc::mesh_camera(camera.name, camera.at(at));
+      ptc::fuzz::require(seen.horizontal_fov > 0 && seen.horizontal_fov < 3.1416F);
+    }
+  }
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace ptc;
-  using fuzz::require;
+  using ptc::fuzz::require;
   std::span bytes(reinterpret_cast<const std::byte*>(data), size);
   std::optional<fuzz::MemoryFile> places;
   const auto zero =
@@ -36,8 +47,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         require(object.material->albedo[c] >= 0 && object.material->albedo[c] <= 1 &&
                 object.material->emission[c] >= 0);
     }
-    for (const MeshCamera& camera : scene.cameras)
-      require(camera.horizontal_fov > 0 && camera.horizontal_fov < 3.1416F);
+    for (const SceneCamera& camera : scene.cameras) check_moving(camera);
   } catch (const DataError&) {
   } catch (const LimitError&) {
   } catch (const std::system_error&) {

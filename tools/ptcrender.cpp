@@ -40,6 +40,10 @@ constexpr char kExamples[] =
     "  ptcrender room.ptcx -o room.png --layer occlusion=occlusion.png\n"
     "  # Render what the surfaces would reflect if they were rough mirrors, too\n"
     "  ptcrender room.ptcx --glossy 0.3 -o room.exr --layer reflection=reflection.png\n"
+    "  # Go once around what is seen, in 48 pictures\n"
+    "  ptcrender dragon.ptcx --mesh dragon.ply --turntable 48 -o turn.##.png\n"
+    "  # Render frames of the second camera of a file, as its animation has it\n"
+    "  ptcrender shot.glb --camera-name closeup --frames 1-100 -o shot.####.exr\n"
     "  # Meet an error of 3 %, and measure the error at 1000 receivers\n"
     "  ptcrender dragon.ptcx --error 3% --check 1000 -o dragon.exr\n";
 
@@ -51,6 +55,7 @@ struct Arguments {
   std::vector<ptc::PictureTarget> layers;
   ptc::LightArguments lights;
   ptc::CameraArguments camera;
+  ptc::SequenceArguments sequence;
 };
 
 /// The layers that a .png may show, without the picture itself.
@@ -75,13 +80,23 @@ void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::add_one_sided(command.app(), request.one_sided);
 }
 
-void declare_picture(CLI::App& app, Arguments& arguments) {
+void declare_picture(ptc::Command& command, Arguments& arguments) {
   constexpr char kGroup[] = "Camera";
+  CLI::App& app = command.app();
   arguments.camera.declare(
       app,
       "Camera position and target [default: from the files]\n"
-      "By default the camera is that of the mesh. Without one it is the camera of the build, and "
-      "without that, one that sees the whole scene, or all that stands on the backdrop.");
+      "By default the camera is the first one of --camera-file. Without that it is the camera of "
+      "the build, then that of the mesh, and without these one that sees the whole scene, or all "
+      "that stands on the backdrop.");
+  command
+      .add_inputs("--camera-file", arguments.request.camera_files, ptc::mesh_endings(),
+                  "Mesh or scene file whose cameras may be taken; repeatable")
+      ->group(kGroup);
+  app.add_option("--camera-name", arguments.request.camera_name,
+                 "Name of the camera of the mesh and scene files that is taken")
+      ->type_name("NAME")
+      ->group(kGroup);
   ptc::add_samples(app, arguments.request.samples)->group(kGroup);
   ptc::add_exposure(app, arguments.request.exposure)->group(kGroup);
 }
@@ -110,6 +125,7 @@ ptc::Outcome render(Arguments& arguments, const ptc::RunOptions& run, ptc::Progr
   arguments.scene.apply(request, arguments.outputs.front(), progress);
   request.camera = arguments.camera.camera();
   request.size = arguments.camera.size();
+  request.sequence = arguments.sequence.sequence();
   if (arguments.lights.given() || request.camera) {
     const glm::vec3 up = ptc::up_of_files(ptc::scene_files(request), request.up);
     if (arguments.lights.given()) {
@@ -127,7 +143,8 @@ int main(int argc, char** argv) {
   ptc::Command command("ptcrender", kPurpose, kExamples);
   Arguments arguments;
   declare_scene(command, arguments);
-  declare_picture(command.app(), arguments);
+  declare_picture(command, arguments);
+  arguments.sequence.declare(command.app());
   declare_lights(command.app(), arguments);
   ptc::Preset preset = ptc::Preset::none;
   ptc::add_preset(command.app(), preset);

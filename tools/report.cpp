@@ -332,8 +332,14 @@ Outcome render_files(const RenderRequest& request,
   std::vector<std::string> told = names;
   std::ranges::rotate(told, told.begin() + static_cast<std::ptrdiff_t>(layers.size()));
   nlohmann::ordered_json facts{{"outputs", names}};
+  std::string subject = join(told, ", ");
+  if (request.sequence) {
+    const std::size_t frames = request.sequence->frames.count();
+    facts["frames"] = frames;
+    subject += fmt::format(" ({} frame{})", frames, frames == 1 ? "" : "s");
+  }
   facts.update(facts_of(report));
-  return {facts, shade_text(join(told, ", "), report)};
+  return {facts, shade_text(subject, report)};
 }
 
 }  // namespace ptc

@@ -31,6 +31,7 @@
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "tools/common.h"
+#include "tools/parse.h"
 #include "tools/values.h"
 
 namespace ptc {
@@ -456,6 +457,47 @@ std::optional<Camera> CameraArguments::camera() const {
     camera.height = (*size_)[1];
   }
   return camera;
+}
+
+void SequenceArguments::declare(CLI::App& app) {
+  constexpr char kGroup[] = "Sequence";
+  const auto set_frames = [this](const std::string& text) {
+    constexpr char kExpected[] = "A-B or A-BxS with the first and the last frame, and a step";
+    // A minus sign may stand before each number
+    const std::size_t dash = text.find('-', 1), cross = text.find('x');
+    const auto number = [&](std::size_t from, std::size_t to) {
+      const auto value = parse_number<std::int64_t>(std::string_view(text).substr(from, to - from));
+      if (!value) refuse("--frames", text, kExpected);
+      return *value;
+    };
+    FrameRange range;
+    range.first = range.last = number(0, std::min({dash, cross, text.size()}));
+    if (dash != std::string::npos) range.last = number(dash + 1, std::min(cross, text.size()));
+    if (cross != std::string::npos) range.step = number(cross + 1, text.size());
+    frames_ = range;
+  };
+  app.add_option_function<std::string>(
+         "--frames", set_frames,
+         "Frames to render, such as 1-100, or 1-100x2 for every second one\n"
+         "In the name of each output #### stands for the number of the frame, with zeros in front; "
+         "%04d does the same. The exposure of the first frame serves all.")
+      ->type_name("A-B[xS]")
+      ->group(kGroup);
+  add_number(app, "--fps", request_.frames_per_second, 1e-6, 1e6,
+             "Frames a second of animations of glTF")
+      ->group(kGroup);
+  add_integer(app, "--turntable", request_.turntable, 1, 100'000,
+              "Go once around what is seen, in frames 1 to N")
+      ->type_name("N")
+      ->default_str("")
+      ->group(kGroup);
+}
+
+std::optional<SequenceRequest> SequenceArguments::sequence() const {
+  if (!frames_ && request_.turntable == 0) return {};
+  SequenceRequest request = request_;
+  request.frames = frames_.value_or(FrameRange{1, std::int64_t{request_.turntable}});
+  return request;
 }
 
 }  // namespace ptc

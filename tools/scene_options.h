@@ -13,6 +13,7 @@
 
 #include "engine/base/progress.h"
 #include "engine/pipeline/render/picture_files.h"
+#include "engine/pipeline/render/shots.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 
@@ -116,6 +117,19 @@ class CameraArguments {
   Camera camera_;
   bool given_ = false;
   std::optional<Size> size_;
+};
+
+/// The values of --frames, --fps and --turntable.
+class SequenceArguments {
+ public:
+  /// Declares the options. This object must outlive the parsing.
+  void declare(CLI::App& app);
+  /// The sequence that was given; empty for one picture.
+  [[nodiscard]] std::optional<SequenceRequest> sequence() const;
+
+ private:
+  std::optional<FrameRange> frames_;
+  SequenceRequest request_;
 };
 
 }  // namespace ptc

@@ -162,8 +162,9 @@ TEST_CASE("scene file: clouds move and turn with their normals, and a camera fra
   const SceneObjects objects = read_scene_objects({file}, nullptr, 1 << 20);
   CHECK(objects.named == object_files({file}));
   REQUIRE(objects.cameras.size() == 1);
-  CHECK(objects.cameras[0].size == std::array<unsigned, 2>{40, 30});
-  CHECK(objects.cameras[0].forward.z == Approx(-1));
+  const MeshCamera seen = mesh_camera("", objects.cameras[0].at(1));
+  CHECK(seen.size == std::array<unsigned, 2>{40, 30});
+  CHECK(seen.forward.z == Approx(-1));
   // The picture is that of the scene's camera
   RenderRequest render;
   render.scene = file;

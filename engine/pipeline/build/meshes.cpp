@@ -10,7 +10,6 @@
 
 #include "engine/base/error.h"
 #include "engine/base/surfel.h"
-#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/scene/ray_scene.h"
 
@@ -78,6 +77,15 @@ void add_in_places(const std::vector<Item>& items, const std::vector<Placement>&
   for (std::size_t i = 0; i < places.size() && !items.empty(); ++i) {
     for (const Item& item : items) all.push_back(placed_at(item, places[i]));
   }
+}
+
+/// Returns the cameras of scene files at a frame, or by default at their first key.
+std::vector<MeshCamera> scene_cameras(const SceneObjects& scene, std::optional<double> frame = {}) {
+  std::vector<MeshCamera> cameras;
+  for (const SceneCamera& camera : scene.cameras)
+    cameras.push_back(
+        mesh_camera(camera.name, frame ? camera.at(*frame) : camera.keys.front().second));
+  return cameras;
 }
 
 /// Collects meshes, and joins them when it is known that all fit.
@@ -265,7 +273,7 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   Joiner joiner(limits, choice, field);
   std::vector<MeshLight> lights;
   const SceneObjects scene = read_scene_objects(inputs, &joiner.textures(), limits.reading);
-  if (cameras) cameras->insert(cameras->end(), scene.cameras.begin(), scene.cameras.end());
+  if (cameras) *cameras = scene_cameras(scene);
   for (const SceneObject& object : scene.objects) {
     if (holds_points(object.file)) continue;
     MeshFile file = read_mesh(object.file, joiner.room(object));
@@ -285,6 +293,19 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   LoadedMeshes loaded = joiner.take();
   loaded.lights = std::move(lights);
   return loaded;
+}
+
+std::vector<MeshCamera> file_cameras(const SceneObjects& scene, std::optional<double> frame,
+                                     double seconds, std::uint64_t memory_bytes) {
+  std::vector<MeshCamera> cameras = scene_cameras(scene, frame);
+  for (const SceneObject& object : scene.objects) {
+    if (holds_points(object.file)) continue;
+    add_in_places(
+        read_cameras(object.file, frame ? std::optional(seconds) : std::nullopt, memory_bytes)
+            .cameras,
+        object.places, cameras);
+  }
+  return cameras;
 }
 
 Bounds bounds_before_backdrop(const Mesh& mesh) {

@@ -5,10 +5,12 @@
 #include <filesystem>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/scene/sampling/mesh_parts.h"
 
 namespace ptc {
@@ -47,7 +49,7 @@ struct LoadedMeshes {
 /// @param also      a mesh in memory, joined after those of the inputs; null: none
 /// @param limits    of all meshes together
 /// @param progress  gets the warnings of each file as notes that begin with its name
-/// @param cameras   gets the cameras of the files, in their order; may be null
+/// @param cameras   gets the cameras of the files, in the order of file_cameras(); may be null
 /// @param field     the member of the request that names the inputs, for errors
 /// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
 ///         `also` or the joined mesh, or append_mesh() refuses to join them; std::system_error
@@ -56,6 +58,18 @@ struct LoadedMeshes {
                                        const MeshLimits& limits, Progress& progress,
                                        std::vector<MeshCamera>* cameras = nullptr,
                                        const char* field = "inputs");
+
+/// Returns the cameras of a scene at a frame: those of scene files, then those of mesh files, once
+/// for each place of the file.
+/// @param scene         as read_scene_objects() returns it
+/// @param frame         its number; empty: cameras of scene files stand at their first key, and
+///                      animations of mesh files are left out
+/// @param seconds       what animations of mesh files show then
+/// @param memory_bytes  cap on the memory while a file is read
+/// @throws DataError, LimitError, std::system_error
+[[nodiscard]] std::vector<MeshCamera> file_cameras(const SceneObjects& scene,
+                                                   std::optional<double> frame, double seconds,
+                                                   std::uint64_t memory_bytes);
 
 /// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
 /// @pre the mesh is in memory

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -35,6 +36,7 @@ constexpr std::uint64_t kCopies = 3;  // of places: those that are read, and wha
 constexpr double kMax = std::numeric_limits<float>::max();
 constexpr Range kFinite{-kMax, kMax};
 constexpr Range kPlace{-1e150, 1e150};
+constexpr double kMaxFrame = 1e9;
 
 /// Returns the place of a translation, a rotation and a scale, applied from the last to the first.
 Placement placement_of(const glm::dvec3& translate, const glm::dquat& rotate,
@@ -136,7 +138,7 @@ class SceneReader {
     if (version != 1) fields.fail("\"ptcx_scene\": 1 is missing, which makes it a scene file");
     read_materials(fields);
     if (const Json* const lights = fields.find("lights")) read_lights(*lights);
-    if (const Json* const camera = fields.find("camera")) read_camera(*camera);
+    read_cameras(fields);
     for_each(fields, "objects",
              [&](const Json& object, const std::string& where) { read_object(object, where); });
     fields.finish();
@@ -214,17 +216,61 @@ class SceneReader {
     scene_.lights = std::move(rig);
   }
 
-  void read_camera(const Json& json) {
-    const Camera camera = within([&] { return camera_from_json(json.dump()); });
-    const CameraAxes axes = axes_of(camera);
-    const double aspect = static_cast<double>(camera.width) / camera.height;
-    scene_.cameras.push_back(
-        {.position = camera.position,
-         .forward = glm::vec3(axes.forward),
-         .up = glm::vec3(axes.up),
-         .horizontal_fov = static_cast<float>(
-             2 * std::atan(std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * aspect)),
-         .size = {camera.width, camera.height}});
+  /// Reads the camera without a name, and then those that have one.
+  void read_cameras(JsonFields& fields) {
+    if (const Json* const camera = fields.find("camera")) read_camera(*camera, "", "camera");
+    const Json* const named = fields.find("cameras");
+    if (named == nullptr) return;
+    if (!named->is_object()) fields.fail("cameras must be an object");
+    for (const auto& [name, json] : named->items()) {
+      if (name.empty()) fields.fail("a name of cameras is empty");
+      read_camera(json, name, "cameras: " + name);
+    }
+  }
+
+  /// Reads a camera. Each of its keys has the members of the camera, and those that it gives in
+  /// place of them.
+  void read_camera(const Json& json, const std::string& name, const std::string& where) {
+    const std::string place = path_.string() + ": " + where;
+    if (!json.is_object()) throw DataError(place + " must be an object");
+    const auto parsed = [](const Json& members, const std::string& of) {
+      try {
+        return camera_from_json(members.dump());
+      } catch (const DataError& error) {
+        throw DataError(of + ": " + error.what());
+      }
+    };
+    SceneCamera camera{.name = name};
+    Json members = json;
+    members.erase("keys");
+    const Camera fixed = parsed(members, place);
+    const auto keys = json.find("keys");
+    if (keys == json.end()) {
+      camera.keys.emplace_back(1, fixed);
+    } else if (!keys->is_array() || keys->empty()) {
+      throw DataError(place + ": keys must be an array that is not empty");
+    } else {
+      for (std::size_t i = 0; i < keys->size(); ++i) {
+        const std::string key_place = fmt::format("{}: keys[{}]", place, i);
+        Json key = (*keys)[i];
+        if (!key.is_object()) throw DataError(key_place + " must be an object");
+        const auto frame = key.find("frame");
+        if (frame == key.end() || !frame->is_number() ||
+            !(std::abs(frame->get<double>()) <= kMaxFrame))
+          throw DataError(key_place + ": frame must be a number of at most 1,000,000,000");
+        const double at = frame->get<double>();
+        if (!camera.keys.empty() && !(at > camera.keys.back().first))
+          throw DataError(key_place + ": frame must be later than that of the key before");
+        key.erase("frame");
+        for (const char* const size : {"width", "height"}) {
+          if (key.contains(size)) throw DataError(key_place + ": the size of a camera stays");
+        }
+        Json merged = members;
+        merged.update(key);
+        camera.keys.emplace_back(at, parsed(merged, key_place));
+      }
+    }
+    scene_.cameras.push_back(std::move(camera));
   }
 
   void read_object(const Json& json, const std::string& where) {
@@ -374,6 +420,36 @@ std::vector<std::filesystem::path> object_files(const std::vector<std::filesyste
   for (SceneObject& object : read_objects(files, nullptr, false, memory_bytes).objects)
     found.push_back(std::move(object.file));
   return found;
+}
+
+Camera SceneCamera::at(double frame) const {
+  const auto after = std::ranges::upper_bound(keys, frame, {}, &std::pair<double, Camera>::first);
+  if (after == keys.begin()) return keys.front().second;
+  if (after == keys.end()) return keys.back().second;
+  const auto& [from_frame, from] = *std::prev(after);
+  const auto& [to_frame, to] = *after;
+  const double share = (frame - from_frame) / (to_frame - from_frame);
+  Camera camera = from;
+  camera.position = glm::mix(from.position, to.position, share);
+  camera.look_at = glm::mix(from.look_at, to.look_at, share);
+  camera.up = glm::vec3(
+      glm::mix(glm::normalize(glm::dvec3(from.up)), glm::normalize(glm::dvec3(to.up)), share));
+  if (camera.up == glm::vec3(0)) camera.up = from.up;  // half way between opposite directions
+  camera.vertical_fov =
+      static_cast<float>(glm::mix(double{from.vertical_fov}, double{to.vertical_fov}, share));
+  return camera;
+}
+
+MeshCamera mesh_camera(const std::string& name, const Camera& camera) {
+  const CameraAxes axes = axes_of(camera);
+  const double aspect = static_cast<double>(camera.width) / camera.height;
+  return {.position = camera.position,
+          .forward = glm::vec3(axes.forward),
+          .up = glm::vec3(axes.up),
+          .horizontal_fov = static_cast<float>(
+              2 * std::atan(std::tan(0.5 * static_cast<double>(camera.vertical_fov)) * aspect)),
+          .size = {camera.width, camera.height},
+          .name = name};
 }
 
 LightRig placed_lights(LightRig rig, const Placement& place) {

@@ -6,9 +6,12 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "engine/io/mesh/mesh.h"
+#include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
 
 namespace ptc {
@@ -21,13 +24,24 @@ struct SceneObject {
   bool one_sided = false;            ///< as for MeshRoom
 };
 
+/// A camera of a scene, which may move.
+struct SceneCamera {
+  std::string name;  ///< may be empty
+  /// Where it stands at some frames, in their order; at least one.
+  std::vector<std::pair<double, Camera>> keys;
+
+  /// Returns the camera at a frame: between two keys their mean, weighted by how near they are;
+  /// before the first or after the last it stands still.
+  [[nodiscard]] Camera at(double frame) const;
+};
+
 /// The content of scene files, and of other files beside them.
 struct SceneObjects {
   /// In the order of the files; those of a scene file that differ in their places alone are one.
   std::vector<SceneObject> objects;
   std::optional<LightRig> lights;  ///< of the first file that has any; its sky's map is not read
   std::vector<std::filesystem::path> named;  ///< all files that scene files name
-  std::vector<MeshCamera> cameras;           ///< of all files
+  std::vector<SceneCamera> cameras;          ///< of scene files
 };
 
 /// Says whether a name is that of a scene file: whether it ends in .scene.json.
@@ -46,6 +60,9 @@ struct SceneObjects {
 [[nodiscard]] std::vector<std::filesystem::path> object_files(
     const std::vector<std::filesystem::path>& files,
     std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max());
+
+/// Returns a camera as those of mesh files are, which keep their horizontal angle.
+[[nodiscard]] MeshCamera mesh_camera(const std::string& name, const Camera& camera);
 
 /// Returns lights that stand in another place, with the sky turned as well. Their intensities stay.
 [[nodiscard]] LightRig placed_lights(LightRig rig, const Placement& place);

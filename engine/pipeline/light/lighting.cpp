@@ -246,9 +246,10 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
   const std::array all{receivers.size()};
   if (counts.empty()) counts = all;
   results_.resize(receivers.size());
+  const std::uint64_t seed = kRunSeed + report_.receivers - shaded_before_;
   const double before = cpu_seconds();
   if (receiver_rays() > 0) {
-    rays_->trace(receivers, receiver_rays(), kRunSeed + report_.receivers, results_, progress_);
+    rays_->trace(receivers, receiver_rays(), seed, results_, progress_);
   } else {
     shader_->shade_variants(receivers, results_, progress_, counts);
   }
@@ -257,7 +258,7 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
   if (request_.glossy.roughness) {
     const double start = cpu_seconds();
     reflections_.resize(receivers.size());
-    rays_->reflect(receivers, mirrors_, kRunSeed + report_.receivers, reflections_);
+    rays_->reflect(receivers, mirrors_, seed, reflections_);
     report_.glossy_cpu_seconds += cpu_seconds() - start;
     lit.reflections = reflections_;
   }

@@ -156,6 +156,13 @@ class Lighting {
   /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse = false);
 
+  /// Begins another picture, in which rays are the same as in the first one.
+  /// @param eye  as for prepare()
+  void begin_picture(const glm::dvec3& eye) noexcept {
+    mirrors_.eye = eye;
+    shaded_before_ = report_.receivers;
+  }
+
   /// The memory of the page cache, bytes, which is free for other uses between two phases.
   /// @pre prepare()
   [[nodiscard]] std::uint64_t cache_bytes() const noexcept { return options_.cache_bytes; }
@@ -200,7 +207,8 @@ class Lighting {
   std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
   std::unique_ptr<RayShader> rays_;  ///< null where the gather shades, and nothing is reflected
   Mirrors mirrors_;
-  std::uint64_t mirror_bytes_ = 0;  ///< of rays_ beside a gather
+  std::uint64_t mirror_bytes_ = 0;   ///< of rays_ beside a gather
+  std::uint64_t shaded_before_ = 0;  ///< receivers of earlier pictures
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
   std::vector<Reflection> reflections_;

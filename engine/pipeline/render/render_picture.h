@@ -17,12 +17,14 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "engine/base/progress.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/render/picture_files.h"
+#include "engine/pipeline/render/shots.h"
 #include "engine/pipeline/render/texture_view.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/lights.h"
@@ -42,10 +44,18 @@ struct RenderRequest : LightingRequest {
   std::shared_ptr<const Mesh> mesh;
   bool backdrop = false;   ///< sets the meshes on a ground in front of a red wall
   bool one_sided = false;  ///< only fronts reflect in mesh formats that know no sides
-  /// Camera of the picture; empty: the one that the scene was built with or, without that, the
-  /// first one of the mesh files or, without that, one that sees everything. A backdrop may then
-  /// leave the picture; what stands on it does not.
+  /// Camera of the picture; empty: the first one of `camera_files` or, without that, the one that
+  /// the scene was built with or, without that, the first one of the mesh files or, without that,
+  /// one that sees everything. A backdrop may then leave the picture; what stands on it does not.
   std::optional<Camera> camera;
+  /// Mesh and scene files whose cameras may be taken.
+  std::vector<std::filesystem::path> camera_files;
+  /// Name of the camera of `camera_files` or of the mesh files that is taken; empty: as `camera`
+  /// says.
+  std::string camera_name;
+  /// Renders the frames of a sequence in place of one picture. In the name of each target a mark
+  /// stands for the number of the frame (frame_name()). The exposure of the first one serves all.
+  std::optional<SequenceRequest> sequence;
   /// Width and height of the picture in pixels; empty: those of the camera.
   std::optional<std::array<unsigned, 2>> size;
   unsigned samples = 4;  ///< samples of each pixel, a square number

@@ -1,0 +1,125 @@
+#include "engine/pipeline/render/frame_cameras.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "engine/base/error.h"
+#include "engine/io/image/image.h"
+#include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/build/scene_file.h"
+#include "engine/pipeline/scene_record.h"
+
+namespace ptc {
+namespace {
+
+/// @throws RequestError when a picture of this camera has no pixels or too many
+void check_size(const Camera& camera) {
+  if (is_image_size(camera.width, camera.height)) return;
+  throw RequestError("size",
+                     fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along each "
+                                 "side, and at most {} in all",
+                                 camera.width, camera.height, kMaxImageSide, kMaxImagePixels));
+}
+
+/// Returns the index of the camera with a name. @throws RequestError when there is none
+std::size_t index_of(const std::vector<MeshCamera>& cameras, const std::string& name) {
+  const auto found = std::ranges::find(cameras, name, &MeshCamera::name);
+  if (found != cameras.end()) return static_cast<std::size_t>(found - cameras.begin());
+  std::string names;
+  for (const MeshCamera& camera : cameras) {
+    if (!camera.name.empty()) names += (names.empty() ? "\"" : ", \"") + camera.name + '"';
+  }
+  throw RequestError("camera_name",
+                     fmt::format("no camera has the name \"{}\": {}", name,
+                                 names.empty() ? "the files name none" : "there are " + names));
+}
+
+/// Returns the camera that does not come from a file.
+Camera fixed_camera(const RenderRequest& request, const ContainerReader& scene,
+                    const Subject& subject) {
+  if (request.camera) return *request.camera;
+  if (request.texture) {
+    constexpr unsigned kSide = 1024;
+    const Bounds box = subject.mesh.bounds();
+    return {.position = 0.5 * (box.low + box.high), .width = kSide, .height = kSide};
+  }
+  std::optional<Bounds> box;
+  if (request.backdrop && subject.has_mesh()) box = bounds_before_backdrop(subject.mesh);
+  return default_camera(scene, {}, box, request.size);
+}
+
+/// Returns the middle of what a camera sees, scene units.
+glm::dvec3 middle_of(const RenderRequest& request, const ContainerReader& scene,
+                     const Subject& subject) {
+  if (subject.has_mesh()) {
+    const Bounds box =
+        request.backdrop ? bounds_before_backdrop(subject.mesh) : subject.mesh.bounds();
+    return 0.5 * (box.low + box.high);
+  }
+  const Superblock& s = scene.superblock();
+  glm::dvec3 middle;
+  for (int k = 0; k < 3; ++k) {
+    const auto axis = static_cast<std::size_t>(k);
+    middle[k] = 0.5 * (s.bounds_low[axis] + s.bounds_high[axis]);
+  }
+  return middle;
+}
+
+}  // namespace
+
+std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& request,
+                                                        const ContainerReader& scene) {
+  if (request.camera || request.texture) return {};
+  const bool is_named = !request.camera_name.empty();
+  if (!is_named && request.camera_files.empty() && scene.meta().text.contains(kCameraKey))
+    return {};
+  std::vector<std::filesystem::path> files = request.camera_files;
+  files.insert(files.end(), request.meshes.begin(), request.meshes.end());
+  const std::uint64_t memory = request.run.memory_bytes;
+  const SceneObjects objects = read_scene_objects(files, nullptr, memory);
+  const std::vector<MeshCamera> still = file_cameras(objects, {}, 0, memory);
+  if (still.empty() && !is_named) return {};
+  const std::size_t index = is_named ? index_of(still, request.camera_name) : 0;
+  if (!request.sequence) return std::vector{still[index]};
+  std::vector<MeshCamera> cameras;
+  const SequenceRequest& sequence = *request.sequence;
+  for (std::size_t i = 0; i < sequence.frames.count(); ++i) {
+    const auto frame = static_cast<double>(sequence.frames[i]);
+    cameras.push_back(
+        file_cameras(objects, frame, frame / sequence.frames_per_second, memory)[index]);
+  }
+  return cameras;
+}
+
+std::vector<Camera> cameras_of_frames(const RenderRequest& request, const ContainerReader& scene,
+                                      const std::optional<std::vector<MeshCamera>>& of_files,
+                                      const Subject& subject) {
+  std::vector<Camera> cameras;
+  if (of_files) {
+    for (const MeshCamera& camera : *of_files) cameras.push_back(camera_of(camera, request.size));
+  } else {
+    cameras.assign(request.sequence ? request.sequence->frames.count() : 1,
+                   fixed_camera(request, scene, subject));
+  }
+  if (request.sequence && request.sequence->turntable > 0) {
+    const glm::dvec3 up(up_of(scene.meta().text));
+    const glm::dvec3 middle = of_files ? middle_of(request, scene, subject) : cameras[0].look_at;
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      cameras[i] = turned_around(cameras[i], middle, up,
+                                 turntable_angle(*request.sequence, request.sequence->frames[i]));
+    }
+  }
+  for (Camera& camera : cameras) {
+    if (request.size) {
+      camera.width = (*request.size)[0];
+      camera.height = (*request.size)[1];
+    }
+    check_size(camera);
+  }
+  return cameras;
+}
+
+}  // namespace ptc

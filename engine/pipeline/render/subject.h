@@ -1,0 +1,87 @@
+// Internal to render_picture(): what a picture shows, how it is seen, and which memory that takes.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/light/lighting.h"
+#include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/render_picture.h"
+#include "engine/pipeline/render/texture_tiles.h"
+#include "engine/pipeline/render/tile_renderer.h"
+
+namespace ptc {
+
+/// The subject of a picture: the camera, what it sees and what lights it. The view refers to the
+/// other members.
+struct Subject {
+  Camera camera;
+  unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
+  Mesh mesh;          ///< empty: the camera sees the surfels
+  std::unique_ptr<RayScene> rays;
+  std::unique_ptr<DirectLight> light;
+  LightSampling sampling;  ///< shadow rays at a mesh
+  float radius = 0;        ///< of the surfels, scene units
+  float lift = 0;          ///< of receivers above a mesh, scene units
+  PictureShadows shadows;
+  bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
+  std::unique_ptr<PrimaryView> view;
+  std::uint64_t texture_bytes = 0;  ///< of the view of a texture
+
+  [[nodiscard]] bool has_mesh() const noexcept { return !mesh.triangles.empty(); }
+  [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{camera.width} * camera.height; }
+  [[nodiscard]] std::uint64_t samples() const { return pixels() * side * side; }
+};
+
+/// Returns the memory for meshes. While they are read, only the sky takes any beside them.
+/// @param target  as for roomiest_temp_dir()
+[[nodiscard]] MeshLimits mesh_limits(const RenderRequest& request, const Sky& sky,
+                                     const std::filesystem::path& target);
+
+/// Loads the meshes.
+/// @param emission  whether they emit
+/// @param target    as for roomiest_temp_dir()
+/// @throws as load_meshes(); RequestError when a texture is asked for and no mesh is in memory
+void load_subject(Subject& subject, const RenderRequest& request, bool emission,
+                  const ContainerReader& scene, const Sky& sky, const std::filesystem::path& target,
+                  Progress& progress);
+
+/// Prepares rays at the subject's mesh, and its lights.
+void trace_subject(Subject& subject, const RenderRequest& request, const Lighting& lighting,
+                   const LightRig& lights);
+/// Makes a view of the subject's mesh from its camera. @pre trace_subject()
+void see_mesh(Subject& subject);
+/// Makes a view of the texture of the subject's mesh, and notes what of it is not as one expects.
+/// @pre trace_subject()
+void see_texture(Subject& subject, const RenderRequest& request, const TextureTile& tile,
+                 const Executor& executor, Progress& progress);
+
+/// The memory of a view of surfels.
+struct SurfelViewBytes {
+  std::uint64_t depth = 0;  ///< of its depth buffer
+  /// Memory of the pages that a view of parts keeps; 0 for a view of the whole picture, which is
+  /// made with the pages of the gather, before that begins.
+  std::uint64_t pages = 0;
+};
+
+/// Returns the memory of the view of a subject: a quarter of the cap may be a depth buffer of the
+/// whole picture, or an eighth one of a part.
+/// @param again  whether more views are made while the gather runs
+[[nodiscard]] SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,
+                                                std::uint64_t cap, bool again);
+/// Makes a view of the scene's surfels from the subject's camera.
+/// @param progress  as for view_surfels()
+void see_surfels(Subject& subject, float lift, const SurfelViewBytes& bytes,
+                 const Lighting& lighting, Progress& progress);
+/// Says whether the samples of such a view lie far apart (spec/shading.md#sparse-pictures).
+[[nodiscard]] bool is_sparse(const Subject& subject, float lift, const Lighting& lighting);
+
+/// Returns windows of receivers that stand for all receivers of a picture. Windows in which the
+/// camera meets nothing are left out.
+[[nodiscard]] std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor);
+
+}  // namespace ptc

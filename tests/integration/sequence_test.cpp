@@ -1,0 +1,255 @@
+// Sequences of pictures: their frames, their cameras and the names of their files.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/image/image.h"
+#include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/scene_file.h"
+#include "engine/pipeline/render/render_picture.h"
+#include "engine/pipeline/render/shots.h"
+#include "tests/support/notes.h"
+#include "tests/support/scenes.h"
+#include "tests/support/temporary_directory.h"
+
+using namespace ptc;
+using Catch::Matchers::Contains;
+
+namespace {
+
+bool same_bytes(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::ifstream first(a, std::ios::binary), second(b, std::ios::binary);
+  REQUIRE((first && second));
+  using Bytes = std::istreambuf_iterator<char>;
+  return std::equal(Bytes(first), Bytes(), Bytes(second), Bytes());
+}
+
+// Two squares that face up, one above a part of the other.
+constexpr char kSquares[] =
+    "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n"
+    "v 0 0.5 0\nv 1 0.5 0\nv 1 0.5 1\nv 0 0.5 1\nf 8 7 6 5\n";
+
+// A scene of squares, seen by a small camera, and the pictures of one request.
+struct Scene {
+  test::TemporaryDirectory dir;
+  test::Notes notes;
+  RenderRequest request;
+
+  Scene() {
+    dir.file("squares.obj", kSquares);
+    BuildRequest build{.inputs = {path("squares.obj")}};
+    build.sampling.count = 3000;
+    build_container(build, path("a.ptcx"), notes);
+    request.scene = path("a.ptcx");
+    request.meshes = {path("squares.obj")};
+    request.camera = Camera{.position = {2, 2, 3}, .look_at = {0, 0.2, 0}};
+    request.size = {{40, 24}};
+    request.samples = 4;
+  }
+  [[nodiscard]] std::filesystem::path path(const std::string& name) const {
+    return dir.path() / name;
+  }
+  LightingReport render(const std::vector<std::string>& names) {
+    std::vector<PictureTarget> targets;
+    for (const std::string& name : names) targets.push_back({path(name)});
+    return render_picture(request, targets, notes);
+  }
+};
+
+glm::dvec3 position_at(const SceneCamera& camera, double frame) {
+  return camera.at(frame).position;
+}
+
+}  // namespace
+
+TEST_CASE("sequence: the number of a frame takes the place of its mark",
+          "[integration][sequence]") {
+  const auto name = [](const char* path, std::int64_t frame) {
+    return frame_name(path, frame).value_or("none").string();
+  };
+  CHECK(name("a.####.exr", 7) == "a.0007.exr");
+  CHECK(name("d#/a.#.exr", 123) == "d#/a.123.exr");
+  CHECK(name("a#b##.png", 5) == "a#b05.png");
+  CHECK(name("a.%04d.exr", 42) == "a.0042.exr");
+  CHECK(name("a.%d.exr", 42) == "a.42.exr");
+  CHECK(name("###.png", -3) == "-03.png");
+  CHECK(name("a.%4d.exr", 1) == "none");
+  CHECK(name("a.%0xd.exr", 1) == "none");
+  CHECK(name("50%", 1) == "none");
+  CHECK(name("d#/a.exr", 1) == "none");
+  const FrameRange frames{-4, 7, 5};
+  REQUIRE(frames.count() == 3);
+  CHECK(frames[0] == -4);
+  CHECK(frames[2] == 6);
+}
+
+TEST_CASE("sequence: a turntable shows what cameras around the target see",
+          "[integration][sequence]") {
+  Scene scene;
+  scene.request.sequence = SequenceRequest{.frames = {1, 4}, .turntable = 4};
+  scene.render({"turn.#.exr"});
+  // A quarter of a turn takes x to -z, and z to x
+  const std::array<glm::dvec3, 4> stands{{{2, 2, 3}, {3, 2, -2}, {-2, 2, -3}, {-3, 2, 2}}};
+  scene.request.sequence.reset();
+  for (std::size_t i = 0; i < 4; ++i) {
+    scene.request.camera->position = stands[i];
+    scene.render({"still.exr"});
+    const Image turned = read_image(scene.path("turn." + std::to_string(i + 1) + ".exr"));
+    const Image still = read_image(scene.path("still.exr"));
+    REQUIRE(turned.pixels.size() == still.pixels.size());
+    double worst = 0;  // a position that is rounded otherwise moves edges by a hair
+    for (std::size_t k = 0; k < still.pixels.size(); ++k)
+      worst += glm::length(glm::dvec3(turned.pixels[k] - still.pixels[k]));
+    CHECK(worst / static_cast<double>(still.pixels.size()) < 1e-3);
+  }
+  CHECK_FALSE(same_bytes(scene.path("turn.1.exr"), scene.path("turn.2.exr")));
+}
+
+TEST_CASE("sequence: each frame is the picture that it is alone, of meshes and of surfels",
+          "[integration][sequence]") {
+  Scene scene;
+  SECTION("of a mesh") {}
+  SECTION("of a mesh, with light in groups") {
+    LightRig rig;
+    rig.suns = {{.group = "key"}};
+    rig.sky.radiance = glm::vec3(0.2F);
+    scene.request.lights = rig;
+    scene.request.light_groups = true;
+  }
+  SECTION("of surfels") {
+    scene.request.meshes.clear();
+  }
+  SECTION("of surfels, in parts") {
+    scene.request.meshes.clear();
+    scene.request.camera->position = {9, 9, 13};
+    scene.request.size = {{800, 600}};
+    scene.request.run.memory_bytes = std::uint64_t{170} << 20;
+  }
+  SECTION("with reflections") {
+    scene.request.glossy = {.roughness = 0.3F, .rays = 4};
+  }
+  scene.request.sequence = SequenceRequest{.frames = {2, 10, 4}, .turntable = 12};
+  const LightingReport all = scene.render({"all.##.exr", "all.##.png"});
+  scene.request.exposure = all.exposure;  // which the first one chose
+  for (const std::int64_t frame : {2, 6, 10}) {
+    scene.request.sequence->frames = {frame, frame};
+    scene.render({"one.##.exr", "one.##.png"});
+    const std::string number = frame < 10 ? "0" + std::to_string(frame) : std::to_string(frame);
+    CHECK(same_bytes(scene.path("all." + number + ".exr"), scene.path("one." + number + ".exr")));
+  }
+  REQUIRE(all.exposure);
+  CHECK(std::filesystem::exists(scene.path("all.10.png")));
+}
+
+TEST_CASE("sequence: cameras of scene files have names, and move between their keys",
+          "[integration][sequence]") {
+  Scene scene;
+  const auto read = [&](const std::string& cameras) {
+    const auto file = scene.dir.file("a.scene.json", R"({"ptcx_scene": 1, )" + cameras + "}");
+    return read_scene_objects({file}, nullptr, 1 << 30).cameras;
+  };
+  const std::vector<SceneCamera> cameras = read(
+      R"("camera": {"position": [1, 2, 3]}, "cameras": {"fly": {"up": [0, 0, 1], "keys": [
+         {"frame": 1, "position": [0, 0, 0], "look_at": [0, 1, 0]},
+         {"frame": 5, "position": [4, 0, 8], "look_at": [0, 1, 0], "vertical_fov": 0.5},
+         {"frame": 6, "position": [4, 9, 8], "look_at": [0, 1, 0], "up": [1, 0, 0]}]}})");
+  REQUIRE(cameras.size() == 2);
+  CHECK(cameras[0].name.empty());
+  CHECK(position_at(cameras[0], 50) == glm::dvec3(1, 2, 3));
+  const SceneCamera& fly = cameras[1];
+  CHECK(fly.name == "fly");
+  CHECK(position_at(fly, -3) == glm::dvec3(0));
+  CHECK(position_at(fly, 2) == glm::dvec3(1, 0, 2));
+  CHECK(fly.at(3).vertical_fov == Approx(0.6));
+  CHECK(fly.at(3).up == glm::vec3(0, 0, 1));
+  CHECK(fly.at(5.5).up == glm::vec3(0.5F, 0, 0.5F));
+  CHECK(position_at(fly, 7) == glm::dvec3(4, 9, 8));
+
+  CHECK_THROWS_WITH(read(R"("cameras": {"a": {"keys": []}})"),
+                    Contains("a.scene.json: cameras: a: keys must be an array"));
+  CHECK_THROWS_WITH(read(R"("cameras": {"a": {"keys": [{"frame": 2}, {"frame": 2}]}})"),
+                    Contains("cameras: a: keys[1]: frame must be later"));
+  CHECK_THROWS_WITH(read(R"("cameras": {"a": {"keys": [{"position": [0, 0, 0]}]}})"),
+                    Contains("keys[0]: frame must be a number"));
+  CHECK_THROWS_WITH(read(R"("cameras": {"a": {"keys": [{"frame": 1, "width": 3}]}})"),
+                    Contains("keys[0]: the size of a camera stays"));
+  CHECK_THROWS_WITH(read(R"("cameras": {"a": {"keys": [{"frame": 1, "fov": 3}]}})"),
+                    Contains("keys[0]: camera: unknown member \"fov\""));
+  CHECK_THROWS_WITH(read(R"("cameras": [])"), Contains("cameras must be an object"));
+  CHECK_THROWS_WITH(read(R"("cameras": {"": {}})"), Contains("a name of cameras is empty"));
+}
+
+TEST_CASE("sequence: a picture by a camera of a file is that by the camera itself",
+          "[integration][sequence]") {
+  Scene scene;
+  scene.dir.file("a.scene.json", R"({"ptcx_scene": 1, "cameras": {
+    "still": {"position": [1, 3, 2], "look_at": [0, 0, 0]},
+    "fly": {"vertical_fov": 0.7, "width": 40, "height": 24, "keys": [
+      {"frame": 0, "position": [2, 2, 3], "look_at": [0, 0.25, 0]},
+      {"frame": 4, "position": [4, 2, 3], "look_at": [0, 0.25, 0]}]}}})");
+  const RenderRequest by_hand = scene.request;
+  scene.request.camera.reset();
+  scene.request.camera_files = {scene.path("a.scene.json")};
+  scene.request.camera_name = "fly";
+  scene.request.sequence = SequenceRequest{.frames = {0, 2, 2}};
+  scene.render({"fly.#.png"});
+  scene.request.sequence.reset();
+  scene.render({"fly.png"});  // its first key
+  scene.request.camera_name = "";
+  scene.render({"first.png"});  // in the order of their names
+
+  const Image fly2 = read_image(scene.path("fly.2.png"));
+  scene.request = by_hand;
+  scene.request.camera = Camera{.position = {3, 2, 3}, .look_at = {0, 0.25, 0}};
+  scene.render({"hand.png"});
+  const Image hand = read_image(scene.path("hand.png"));
+  double sum = 0;
+  for (std::size_t k = 0; k < hand.pixels.size(); ++k)
+    sum += glm::length(glm::dvec3(fly2.pixels[k] - hand.pixels[k]));
+  CHECK(sum / static_cast<double>(hand.pixels.size()) < 0.02);  // exposure is that of frame 0
+  CHECK(same_bytes(scene.path("fly.png"), scene.path("fly.0.png")));
+  CHECK(same_bytes(scene.path("first.png"), scene.path("fly.0.png")));
+
+  scene.request.camera.reset();
+  scene.request.camera_files = {scene.path("a.scene.json")};
+  scene.request.camera_name = "Fly";
+  CHECK_THROWS_WITH(scene.render({"x.png"}),
+                    "no camera has the name \"Fly\": there are \"fly\", \"still\"");
+  scene.request.camera_files.clear();
+  CHECK_THROWS_WITH(scene.render({"x.png"}), "no camera has the name \"Fly\": the files name none");
+}
+
+TEST_CASE("sequence: what contradicts itself is refused", "[integration][sequence]") {
+  Scene scene;
+  scene.request.sequence = SequenceRequest{.frames = {1, 3}};
+  CHECK_THROWS_WITH(scene.render({"a.png"}), Contains("needs a mark for the number of the frame"));
+  scene.request.camera_name = "a";
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), "`camera_name` and a camera exclude each other");
+  scene.request.camera_name = "";
+  scene.request.sequence->frames = {3, 1};
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), Contains("comes before the first"));
+  scene.request.sequence->frames = {1, 3, 0};
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), Contains("step"));
+  scene.request.sequence->frames = {1, 200'000};
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), Contains("more than 100,000"));
+  scene.request.sequence->frames = {1, 3};
+  scene.request.sequence->frames_per_second = 0;
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), Contains("frames_per_second"));
+  scene.request.sequence->frames_per_second = 24;
+  scene.request.glossy.roughness = 0.5F;
+  scene.request.check.receivers = 10;
+  CHECK_THROWS_WITH(scene.render({"a#.png"}), Contains("compares reflections of one picture"));
+  scene.request.glossy.roughness.reset();
+  scene.request.check.receivers = 0;
+  scene.request.texture = TextureTarget{};
+  CHECK_THROWS_WITH(scene.render({"a#.exr"}), Contains("a texture has none"));
+}
