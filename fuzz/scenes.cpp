@@ -39,7 +39,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const fuzz::MemoryFile file(bytes, "a.scene.json");
   try {
-    const SceneObjects scene = read_scene_objects({file.path()}, nullptr, 1 << 20);
+    const SceneObjects first = read_scene_objects({file.path()}, nullptr, 1 << 20);
+    const SceneObjects scene =
+        read_scene_objects({file.path()}, nullptr, 1 << 20, Moment{.frame = 3.75});
+    require(scene.moves == first.moves && scene.named == first.named);
     for (const SceneObject& object : scene.objects) {
       require(!object.file.empty() && std::ranges::all_of(object.places, is_placement));
       if (!object.material) continue;

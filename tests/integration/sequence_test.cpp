@@ -228,6 +228,129 @@ TEST_CASE("sequence: a picture by a camera of a file is that by the camera itsel
   CHECK_THROWS_WITH(scene.render({"x.png"}), "no camera has the name \"Fly\": the files name none");
 }
 
+TEST_CASE("sequence: objects of a scene file move between their keys", "[integration][sequence]") {
+  Scene scene;
+  scene.dir.file("square.obj", "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 4 3 2 1\n");
+  const auto file = [&](const char* name, const std::string& of_second) {
+    return scene.dir.file(name, R"({"ptcx_scene": 1, "objects": [{"file": "square.obj"},
+      {"file": "square.obj", "scale": 0.5, )" +
+                                    of_second + "}]}");
+  };
+  const auto moving = file("moving.scene.json", R"("rotate": [0, 1, 0, 90], "keys": [
+    {"frame": 1, "translate": [0, 0.5, 0], "rotate": [0, 1, 0, 0]},
+    {"frame": 3, "translate": [1, 0.5, 0], "rotate": [0, 1, 0, 360]},
+    {"frame": 4, "translate": [1, 1.5, 0], "rotate": [1, 0, 0, 90]},
+    {"frame": 6, "translate": [1, 1.5, 0]}])");
+  const std::array<const char*, 6> places{
+      R"("translate": [0, 0.5, 0])", R"("translate": [0.5, 0.5, 0], "rotate": [0, 1, 0, 180])",
+      R"("translate": [1, 0.5, 0], "rotate": [0, 1, 0, 360])",
+      R"("translate": [1, 1.5, 0], "rotate": [1, 0, 0, 90])",
+      // Half way between a quarter turn around x and one around y
+      R"("translate": [1, 1.5, 0], "rotate": [1, 1, 0, 70.52877936550931])",
+      R"("translate": [1, 1.5, 0], "rotate": [0, 1, 0, 90])"};
+  scene.request.meshes.clear();
+  scene.request.sampling.count = 2000;
+  scene.request.exposure = 0;
+  scene.request.scene = moving;
+  scene.request.sequence = SequenceRequest{.frames = {1, 6}};
+  const LightingReport all = scene.render({"all.#.exr"});
+  scene.request.sequence.reset();
+  std::uint64_t receivers = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    scene.request.scene = file("still.scene.json", places[i]);
+    receivers += scene.render({"still.exr"}).receivers;
+    const Image moved = read_image(scene.path("all." + std::to_string(i + 1) + ".exr"));
+    const Image still = read_image(scene.path("still.exr"));
+    double sum = 0;  // places that are rounded otherwise move edges by a hair
+    for (std::size_t k = 0; k < still.pixels.size(); ++k)
+      sum += glm::length(glm::dvec3(moved.pixels[k] - still.pixels[k]));
+    INFO("frame " << i + 1);
+    CHECK(sum / static_cast<double>(still.pixels.size()) < 2e-3);
+  }
+  CHECK(std::abs(static_cast<double>(all.receivers) - static_cast<double>(receivers)) <
+        0.01 * static_cast<double>(receivers));
+
+  // One picture shows the first keys, and a container stands still
+  scene.request.scene = moving;
+  scene.render({"first.exr"});
+  CHECK(same_bytes(scene.path("first.exr"), scene.path("all.1.exr")));
+  const auto fault = [&](const std::string& members) {
+    scene.request.scene = file("x.scene.json", members);
+    try {
+      scene.render({"x.exr"});
+    } catch (const DataError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  CHECK_THAT(fault(R"("keys": {})"), Contains("objects[1]: keys must be an array"));
+  CHECK_THAT(fault(R"("keys": [{}])"), Contains("keys[0]: frame must be a number"));
+  CHECK_THAT(fault(R"("keys": [3])"), Contains("objects[1]: keys[0]"));
+  CHECK_THAT(fault(R"("keys": [{"frame": 2}, {"frame": 1}])"), Contains("keys[1]: frame must be"));
+  CHECK_THAT(fault(R"("keys": [{"frame": 2}], "matrix": [1,0,0,0,0,1,0,0,0,0,1,0])"),
+             Contains("keys excludes matrix"));
+  CHECK_THAT(fault(R"("keys": [{"frame": 2}], "placements": [{}])"),
+             Contains("keys excludes placements"));
+  CHECK_THAT(fault(R"("keys": [{"frame": 2, "scale": 0}])"),
+             Contains("keys[0]: the place cannot be inverted"));
+}
+
+TEST_CASE("sequence: animations of glTF are seen at the times of frames",
+          "[integration][sequence]") {
+  Scene scene;
+  // A triangle that faces up and rises by 1 in 2 seconds, and a camera that stands
+  const std::array<float, 9> corners{-1, 0, -1, -1, 0, 1, 1, 0, 1};
+  const std::array<float, 8> keys{0, 2, 0, 0, 0, 0, 1, 0};
+  scene.dir.file("a.bin", std::string(reinterpret_cast<const char*>(corners.data()), 36) +
+                              std::string(reinterpret_cast<const char*>(keys.data()), 32));
+  const auto file = [&](const char* name, const std::string& node, const std::string& animations) {
+    return scene.dir.file(name, R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}],
+      "nodes": [{"mesh": 0)" + node +
+                                    R"(}, {"camera": 0, "name": "shot", "translation": [0, 1, 5]}],
+      "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
+      "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+      "buffers": [{"uri": "a.bin", "byteLength": 68}],
+      "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 8},
+                      {"buffer": 0, "byteOffset": 44, "byteLength": 24}],
+      "accessors": [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1,0,-1], "max": [1,0,1]},
+        {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [2]},
+        {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}])" +
+                                    animations + "}");
+  };
+  const auto moving = file("moving.gltf", "", R"(, "animations": [{
+      "samplers": [{"input": 1, "output": 2}],
+      "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}])");
+  scene.request.camera.reset();
+  scene.request.camera_name = "shot";
+  scene.request.meshes.clear();
+  scene.request.sampling.count = 500;
+  scene.request.exposure = 0;
+  scene.request.scene = moving;
+  scene.request.sequence = SequenceRequest{.frames = {0, 40, 10}, .frames_per_second = 20};
+  scene.render({"all.##.exr"});
+  scene.request.sequence.reset();
+  for (const int frame : {0, 10, 20, 30, 40}) {
+    scene.request.scene =
+        file("still.gltf", R"(, "translation": [0, )" + std::to_string(frame / 40.0) + ", 0]", "");
+    scene.render({"still.exr"});
+    INFO("frame " << frame);
+    CHECK(same_bytes(scene.path("still.exr"), *frame_name(scene.path("all.##.exr"), frame)));
+  }
+
+  // A container stands still, which is told
+  BuildRequest build{.inputs = {moving}};
+  build.sampling.count = 500;
+  build_container(build, scene.path("b.ptcx"), scene.notes);
+  scene.notes.texts.clear();
+  scene.request.scene = scene.path("b.ptcx");
+  scene.request.meshes = {moving};
+  scene.request.sequence = SequenceRequest{.frames = {0, 0}};
+  scene.render({"b#.exr"});
+  REQUIRE(scene.notes.texts.size() == 1);
+  CHECK_THAT(scene.notes.texts[0], Contains("the meshes move, but the container does not"));
+}
+
 TEST_CASE("sequence: what contradicts itself is refused", "[integration][sequence]") {
   Scene scene;
   scene.request.sequence = SequenceRequest{.frames = {1, 3}};

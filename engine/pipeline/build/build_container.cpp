@@ -142,6 +142,8 @@ class Build {
                     "`tree.levels_per_stream` is not 1 or more");
     require_request(request_.selection.every >= 1, "selection.every",
                     "`selection.every` is not 1 or more");
+    require_request(!request_.moment || !request_.resume, "resume",
+                    "`resume` is for scenes that stand still");
     require_request(request_.checkpoint_points >= 1, "checkpoint_points",
                     "`checkpoint_points` is not 1 or more");
     require_request(request_.city_points == 0 || (!request_.mesh && request_.inputs.empty()),

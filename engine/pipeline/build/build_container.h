@@ -26,6 +26,7 @@
 #include "engine/octree/build_pages.h"
 #include "engine/octree/rounding.h"
 #include "engine/pipeline/build/build_space.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/selection.h"
 #include "engine/scene/light/lights.h"
@@ -66,6 +67,8 @@ struct BuildRequest {
   bool remove_duplicates = false;  ///< of points at one position keeps the first
   bool backdrop = false;           ///< sets the meshes on a ground in front of a red wall
   bool one_sided = false;          ///< only fronts reflect in mesh formats that know no sides
+  /// When inputs that move are shown, as for MeshChoice. Excludes `resume`.
+  std::optional<Moment> moment{};
   /// Lights of the meshes, and the sky that lights what is shaded later. Empty: those that
   /// files of meshes define, else default_rig() for meshes, but no lights at all when one of them
   /// emits light; cloud_rig() for clouds without radiance alone.

@@ -265,7 +265,8 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
                        const MeshLimits& limits, Progress& progress) {
   BuildInputs inputs;
   Progress silent;
-  SceneObjects objects = read_scene_objects(request.inputs, nullptr, limits.reading);
+  SceneObjects objects =
+      read_scene_objects(request.inputs, nullptr, limits.reading, request.moment);
   const bool alone = objects.objects.size() == 1 && objects.objects[0].places.size() <= 1 &&
                      !request.mesh && !scene;
   for (const SceneObject& object : objects.objects) {
@@ -291,8 +292,9 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   inputs.bounds.add(inputs.clouds.bounds);
   inputs.sample = std::move(inputs.clouds.sample);
-  LoadedMeshes meshes = load_meshes(request.inputs, request.mesh.get(),
-                                    {request.backdrop, request.one_sided}, limits, progress);
+  LoadedMeshes meshes =
+      load_meshes(request.inputs, request.mesh.get(),
+                  {request.backdrop, request.one_sided, request.moment}, limits, progress);
   plan_channels(request, scene, !meshes.empty(), inputs, progress);
   const bool given = request.lights || objects.lights;
   if (request.lights) {

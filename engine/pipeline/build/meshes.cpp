@@ -79,13 +79,18 @@ void add_in_places(const std::vector<Item>& items, const std::vector<Placement>&
   }
 }
 
-/// Returns the cameras of scene files at a frame, or by default at their first key.
-std::vector<MeshCamera> scene_cameras(const SceneObjects& scene, std::optional<double> frame = {}) {
+/// Returns the cameras of scene files at a moment.
+std::vector<MeshCamera> scene_cameras(const SceneObjects& scene,
+                                      const std::optional<Moment>& moment) {
   std::vector<MeshCamera> cameras;
   for (const SceneCamera& camera : scene.cameras)
     cameras.push_back(
-        mesh_camera(camera.name, frame ? camera.at(*frame) : camera.keys.front().second));
+        mesh_camera(camera.name, moment ? camera.at(moment->frame) : camera.keys.front().second));
   return cameras;
+}
+
+std::optional<double> seconds_of(const std::optional<Moment>& moment) {
+  return moment ? std::optional(moment->seconds) : std::nullopt;
 }
 
 /// Collects meshes, and joins them when it is known that all fit.
@@ -105,7 +110,8 @@ class Joiner {
             .temp_directory = limits_.temp_directory,
             .textures = textures_,
             .material = object.material,
-            .one_sided = choice_.one_sided || object.one_sided};
+            .one_sided = choice_.one_sided || object.one_sided,
+            .seconds = seconds_of(choice_.moment)};
   }
   [[nodiscard]] TextureStore& textures() noexcept { return *textures_; }
 
@@ -272,8 +278,9 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   // Read the mesh files
   Joiner joiner(limits, choice, field);
   std::vector<MeshLight> lights;
-  const SceneObjects scene = read_scene_objects(inputs, &joiner.textures(), limits.reading);
-  if (cameras) *cameras = scene_cameras(scene);
+  const SceneObjects scene =
+      read_scene_objects(inputs, &joiner.textures(), limits.reading, choice.moment);
+  if (cameras) *cameras = scene_cameras(scene, choice.moment);
   for (const SceneObject& object : scene.objects) {
     if (holds_points(object.file)) continue;
     MeshFile file = read_mesh(object.file, joiner.room(object));
@@ -295,17 +302,22 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   return loaded;
 }
 
-std::vector<MeshCamera> file_cameras(const SceneObjects& scene, std::optional<double> frame,
-                                     double seconds, std::uint64_t memory_bytes) {
-  std::vector<MeshCamera> cameras = scene_cameras(scene, frame);
+std::vector<MeshCamera> file_cameras(const SceneObjects& scene, const std::optional<Moment>& moment,
+                                     std::uint64_t memory_bytes) {
+  std::vector<MeshCamera> cameras = scene_cameras(scene, moment);
   for (const SceneObject& object : scene.objects) {
     if (holds_points(object.file)) continue;
-    add_in_places(
-        read_cameras(object.file, frame ? std::optional(seconds) : std::nullopt, memory_bytes)
-            .cameras,
-        object.places, cameras);
+    add_in_places(read_cameras(object.file, seconds_of(moment), memory_bytes).cameras,
+                  object.places, cameras);
   }
   return cameras;
+}
+
+bool moves(const SceneObjects& scene, std::uint64_t memory_bytes) {
+  return scene.moves || std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
+           return !holds_points(object.file) &&
+                  read_cameras(object.file, {}, memory_bytes).moves_mesh;
+         });
 }
 
 Bounds bounds_before_backdrop(const Mesh& mesh) {

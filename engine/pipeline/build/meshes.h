@@ -32,6 +32,9 @@ struct MeshLimits {
 struct MeshChoice {
   bool backdrop = false;   ///< sets them on a ground in front of a red wall
   bool one_sided = false;  ///< as for MeshRoom
+  /// When scenes that move are shown; empty: scene files at their first keys, and mesh files
+  /// without their animations.
+  std::optional<Moment> moment{};
 };
 
 /// The meshes of a request.
@@ -59,17 +62,19 @@ struct LoadedMeshes {
                                        std::vector<MeshCamera>* cameras = nullptr,
                                        const char* field = "inputs");
 
-/// Returns the cameras of a scene at a frame: those of scene files, then those of mesh files, once
+/// Returns the cameras of a scene at a moment: those of scene files, then those of mesh files, once
 /// for each place of the file.
-/// @param scene         as read_scene_objects() returns it
-/// @param frame         its number; empty: cameras of scene files stand at their first key, and
-///                      animations of mesh files are left out
-/// @param seconds       what animations of mesh files show then
+/// @param scene         as read_scene_objects() returns it for the moment
+/// @param moment        as for MeshChoice
 /// @param memory_bytes  cap on the memory while a file is read
 /// @throws DataError, LimitError, std::system_error
 [[nodiscard]] std::vector<MeshCamera> file_cameras(const SceneObjects& scene,
-                                                   std::optional<double> frame, double seconds,
+                                                   const std::optional<Moment>& moment,
                                                    std::uint64_t memory_bytes);
+
+/// Says whether an object of a scene moves, by its keys or by an animation of its file.
+/// @throws as file_cameras()
+[[nodiscard]] bool moves(const SceneObjects& scene, std::uint64_t memory_bytes);
 
 /// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
 /// @pre the mesh is in memory

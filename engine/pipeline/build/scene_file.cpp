@@ -113,11 +113,12 @@ class SceneReader {
  public:
   /// @param places  whether files of places are read
   SceneReader(const std::filesystem::path& path, TextureStore* textures, bool places,
-              std::uint64_t memory_bytes, SceneObjects& scene)
+              std::uint64_t memory_bytes, const std::optional<Moment>& moment, SceneObjects& scene)
       : path_(path),
         textures_(textures),
         reads_places_(places),
         memory_bytes_(memory_bytes),
+        moment_(moment),
         scene_(scene) {}
 
   void read() {
@@ -228,6 +229,17 @@ class SceneReader {
     }
   }
 
+  /// Reads the frame of a key.
+  /// @param before  that of the key before; empty: it is the first one
+  static double read_frame(JsonFields& key, const std::optional<double>& before) {
+    const Json* const frame = key.find("frame");
+    if (frame == nullptr || !frame->is_number() || !(std::abs(frame->get<double>()) <= kMaxFrame))
+      key.fail("frame must be a number of at most 1,000,000,000");
+    const double at = frame->get<double>();
+    if (before && !(at > *before)) key.fail("frame must be later than that of the key before");
+    return at;
+  }
+
   /// Reads a camera. Each of its keys has the members of the camera, and those that it gives in
   /// place of them.
   void read_camera(const Json& json, const std::string& name, const std::string& where) {
@@ -253,14 +265,9 @@ class SceneReader {
       for (std::size_t i = 0; i < keys->size(); ++i) {
         const std::string key_place = fmt::format("{}: keys[{}]", place, i);
         Json key = (*keys)[i];
-        if (!key.is_object()) throw DataError(key_place + " must be an object");
-        const auto frame = key.find("frame");
-        if (frame == key.end() || !frame->is_number() ||
-            !(std::abs(frame->get<double>()) <= kMaxFrame))
-          throw DataError(key_place + ": frame must be a number of at most 1,000,000,000");
-        const double at = frame->get<double>();
-        if (!camera.keys.empty() && !(at > camera.keys.back().first))
-          throw DataError(key_place + ": frame must be later than that of the key before");
+        JsonFields of(key, key_place);
+        const double at = read_frame(
+            of, camera.keys.empty() ? std::nullopt : std::optional(camera.keys.back().first));
         key.erase("frame");
         for (const char* const size : {"width", "height"}) {
           if (key.contains(size)) throw DataError(key_place + ": the size of a camera stays");
@@ -292,7 +299,10 @@ class SceneReader {
       object.one_sided = sided->get<bool>();
     }
     const Json* const placements = fields.find("placements");
-    if (placements == nullptr) {
+    if (const Json* const keys = fields.find("keys")) {
+      if (placements != nullptr) fields.fail("keys excludes placements");
+      object.places.push_back(read_keys(fields, *keys, where));
+    } else if (placements == nullptr) {
       if (const auto place = read_place(fields)) object.places.push_back(*place);
     } else if (placements->is_string()) {
       const std::filesystem::path path = resolved(placements->get<std::string>(), fields);
@@ -328,39 +338,106 @@ class SceneReader {
     places.insert(places.end(), object.places.begin(), object.places.end());
   }
 
+  /// The parts of a place, which are applied from the last to the first.
+  struct PlaceParts {
+    glm::dvec3 translate{0};
+    glm::dvec3 axis{0, 1, 0};  ///< unit
+    double angle = 0;          ///< around it, radians
+    glm::dvec3 scale{1};
+
+    [[nodiscard]] Placement place() const {
+      return placement_of(translate, glm::angleAxis(angle, axis), scale);
+    }
+  };
+
+  /// Reads the members that give the parts of a place; those that are absent stay.
+  /// @return whether there are any
+  static bool read_parts(JsonFields& fields, PlaceParts& parts) {
+    const Json* const rotate = fields.find("rotate");
+    const Json* const scale = fields.find("scale");
+    const bool any = fields.find("translate") != nullptr || rotate != nullptr || scale != nullptr;
+    fields.read("translate", parts.translate, kPlace);
+    if (rotate != nullptr) {
+      const std::vector<double> n = numbers(fields, *rotate, "rotate", {4});
+      const glm::dvec3 axis(n[0], n[1], n[2]);
+      const double length = glm::length(axis);
+      if (!(length > 0)) fields.fail("the axis of rotate must not be zero");
+      parts.axis = axis / length;
+      parts.angle = glm::radians(n[3]);
+    }
+    if (scale != nullptr && scale->is_number()) {
+      parts.scale = glm::dvec3(scale->get<double>());
+    } else if (scale != nullptr) {
+      if (!scale->is_array()) fields.fail("scale must be a number or an array of three numbers");
+      fields.read("scale", parts.scale, kFinite);
+    }
+    return any;
+  }
+
   /// Reads a place; nothing where no member gives one.
   [[nodiscard]] static std::optional<Placement> read_place(JsonFields& fields) {
     const Json* const matrix = fields.find("matrix");
-    const Json* const rotate = fields.find("rotate");
-    const Json* const scale = fields.find("scale");
-    const bool moves = fields.find("translate") != nullptr || rotate != nullptr || scale != nullptr;
-    if (matrix == nullptr && !moves) return {};
-    if (matrix != nullptr && moves) fields.fail("matrix excludes translate, rotate and scale");
-    Placement place(1);
+    PlaceParts parts;
+    const bool has_parts = read_parts(fields, parts);
+    if (matrix == nullptr && !has_parts) return {};
+    if (matrix != nullptr && has_parts) fields.fail("matrix excludes translate, rotate and scale");
+    Placement place = parts.place();
     if (matrix != nullptr) {
       const std::vector<double> rows = numbers(fields, *matrix, "matrix", {12, 16});
       if (!ends_as_affine(rows)) fields.fail("the last row of matrix must be 0, 0, 0, 1");
       place = placement_of(rows);
-    } else {
-      glm::dvec3 translate(0), size(1);
-      fields.read("translate", translate, kPlace);
-      glm::dquat turn(1, 0, 0, 0);
-      if (rotate != nullptr) {
-        const std::vector<double> n = numbers(fields, *rotate, "rotate", {4});
-        const glm::dvec3 axis(n[0], n[1], n[2]);
-        const double length = glm::length(axis);
-        if (!(length > 0)) fields.fail("the axis of rotate must not be zero");
-        turn = glm::angleAxis(glm::radians(n[3]), axis / length);
-      }
-      if (scale != nullptr && scale->is_number()) {
-        size = glm::dvec3(scale->get<double>());
-      } else if (scale != nullptr) {
-        if (!scale->is_array()) fields.fail("scale must be a number or an array of three numbers");
-        fields.read("scale", size, kFinite);
-      }
-      place = placement_of(translate, turn, size);
     }
     if (!is_placement(place)) fields.fail("the place cannot be inverted");
+    return place;
+  }
+
+  /// Returns the place between two others.
+  /// @param share  of the way to the second one
+  static PlaceParts between(const PlaceParts& from, const PlaceParts& to, double share) {
+    PlaceParts parts = from;
+    parts.translate = glm::mix(from.translate, to.translate, share);
+    parts.scale = glm::mix(from.scale, to.scale, share);
+    if (from.axis == to.axis) {
+      parts.angle = glm::mix(from.angle, to.angle, share);
+    } else {
+      const glm::dquat turn = glm::slerp(glm::angleAxis(from.angle, from.axis),
+                                         glm::angleAxis(to.angle, to.axis), share);
+      parts.axis = glm::axis(turn);
+      parts.angle = glm::angle(turn);
+    }
+    return parts;
+  }
+
+  /// Reads the keys of an object. Each has the parts that the object gives, but for those that it
+  /// gives itself.
+  /// @return the place at the moment that is read
+  [[nodiscard]] Placement read_keys(JsonFields& fields, const Json& keys,
+                                    const std::string& where) {
+    if (fields.find("matrix") != nullptr) fields.fail("keys excludes matrix");
+    PlaceParts usual;
+    read_parts(fields, usual);
+    if (!keys.is_array() || keys.empty()) fields.fail("keys must be an array that is not empty");
+    PlaceParts before, found;
+    double frame_before = 0;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      JsonFields of(keys[i], fmt::format("{}: keys[{}]", where, i));
+      const double frame = read_frame(of, i == 0 ? std::nullopt : std::optional(frame_before));
+      PlaceParts parts = usual;
+      read_parts(of, parts);
+      of.finish();
+      if (!is_placement(parts.place())) of.fail("the place cannot be inverted");
+      const double at = moment_ ? moment_->frame : frame;
+      if (i == 0) {
+        found = parts;
+      } else if (moment_ && at > frame_before) {
+        found = between(before, parts, std::min(1.0, (at - frame_before) / (frame - frame_before)));
+      }
+      before = parts;
+      frame_before = frame;
+    }
+    scene_.moves |= keys.size() > 1;
+    const Placement place = found.place();
+    if (!is_placement(place)) fields.fail("the place cannot be inverted between two keys");
     return place;
   }
 
@@ -381,6 +458,7 @@ class SceneReader {
   TextureStore* textures_;
   bool reads_places_;
   std::uint64_t memory_bytes_;
+  const std::optional<Moment>& moment_;
   SceneObjects& scene_;
   std::uint64_t places_ = 0;  ///< of all objects so far
   std::map<std::string, Material> materials_;
@@ -391,11 +469,12 @@ class SceneReader {
 /// Implements read_scene_objects().
 /// @param places  whether files of places are read
 SceneObjects read_objects(const std::vector<std::filesystem::path>& files, TextureStore* textures,
-                          bool places, std::uint64_t memory_bytes) {
+                          bool places, std::uint64_t memory_bytes,
+                          const std::optional<Moment>& moment = {}) {
   SceneObjects scene;
   for (const std::filesystem::path& file : files) {
     if (is_scene_file(file)) {
-      SceneReader(file, textures, places, memory_bytes, scene).read();
+      SceneReader(file, textures, places, memory_bytes, moment, scene).read();
     } else {
       scene.objects.push_back({.file = file});
     }
@@ -410,8 +489,9 @@ bool is_scene_file(const std::filesystem::path& path) {
 }
 
 SceneObjects read_scene_objects(const std::vector<std::filesystem::path>& files,
-                                TextureStore* textures, std::uint64_t memory_bytes) {
-  return read_objects(files, textures, true, memory_bytes);
+                                TextureStore* textures, std::uint64_t memory_bytes,
+                                const std::optional<Moment>& moment) {
+  return read_objects(files, textures, true, memory_bytes, moment);
 }
 
 std::vector<std::filesystem::path> object_files(const std::vector<std::filesystem::path>& files,

@@ -24,6 +24,12 @@ struct SceneObject {
   bool one_sided = false;            ///< as for MeshRoom
 };
 
+/// A moment of a sequence, at which scenes that move are shown.
+struct Moment {
+  double frame = 1;    ///< of keys in scene files
+  double seconds = 0;  ///< of animations in mesh files
+};
+
 /// A camera of a scene, which may move.
 struct SceneCamera {
   std::string name;  ///< may be empty
@@ -41,6 +47,7 @@ struct SceneObjects {
   std::vector<SceneObject> objects;
   std::optional<LightRig> lights;  ///< of the first file that has any; its sky's map is not read
   std::vector<std::filesystem::path> named;  ///< all files that scene files name
+  bool moves = false;                        ///< whether an object has keys
   std::vector<SceneCamera> cameras;          ///< of scene files
 };
 
@@ -50,10 +57,12 @@ struct SceneObjects {
 /// Returns the objects of files: those that scene files name, and other files themselves.
 /// @param textures      reads the textures of materials; null: they are left out
 /// @param memory_bytes  cap on the memory of the JSON, and on that of the places
+/// @param moment        where objects with keys stand; empty: at their first key
 /// @throws DataError for a scene file that breaks its format, which names the member that is wrong;
 ///         LimitError for one that takes more memory; std::system_error
 [[nodiscard]] SceneObjects read_scene_objects(const std::vector<std::filesystem::path>& files,
-                                              TextureStore* textures, std::uint64_t memory_bytes);
+                                              TextureStore* textures, std::uint64_t memory_bytes,
+                                              const std::optional<Moment>& moment = {});
 
 /// Returns the files of the objects of files, without a look at their places.
 /// @throws as read_scene_objects()

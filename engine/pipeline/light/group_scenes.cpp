@@ -54,7 +54,38 @@ void add_costs(LightingReport& report, const LightingReport& group) {
   report.bounce_cpu_seconds += group.bounce_cpu_seconds;
   report.gather.add(group.gather);
   report.cache = group.cache;
-  report.seconds.insert(report.seconds.end(), group.seconds.begin(), group.seconds.end());
+  for (const auto& [stage, seconds] : group.seconds) {
+    const auto known =
+        std::ranges::find(report.seconds, stage, [](const auto& s) { return s.first; });
+    if (known == report.seconds.end()) {
+      report.seconds.emplace_back(stage, seconds);
+    } else {
+      known->second += seconds;
+    }
+  }
+}
+
+void add_run(LightingReport& report, const LightingReport& run) {
+  const std::uint64_t receivers = report.receivers + run.receivers;
+  add_costs(report, run);
+  report.receivers = receivers;
+  report.settings = run.settings;
+  if (run.exposure) report.exposure = run.exposure;
+  // Tell of the one that is farthest from what was asked
+  if (run.tuning && (!report.tuning || report.tuning->met)) report.tuning = run.tuning;
+  if (run.damage && (!report.damage || report.damage->pages.empty())) report.damage = run.damage;
+  if (!run.check || run.check->receivers == 0) return;
+  if (!report.check) {
+    report.check = run.check;
+    return;
+  }
+  CheckReport& check = *report.check;
+  const auto before = static_cast<double>(check.receivers),
+             more = static_cast<double>(run.check->receivers);
+  check.discs = pooled(check.discs, before, run.check->discs, more);
+  if (check.mesh && run.check->mesh)
+    check.mesh = pooled(*check.mesh, before, *run.check->mesh, more);
+  check.receivers += run.check->receivers;
 }
 
 }  // namespace ptc

@@ -43,7 +43,10 @@ class RelitScene {
   TemporaryName name_;
 };
 
-/// Adds what a group's run cost to the report of all.
+/// Adds what a group's run cost to the report of all. Stages of one name become one.
 void add_costs(LightingReport& report, const LightingReport& group);
+/// Adds another run, with receivers of its own, to the report of all: its costs, the errors of
+/// those that were checked, and what fell short most.
+void add_run(LightingReport& report, const LightingReport& run);
 
 }  // namespace ptc

@@ -79,18 +79,16 @@ std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& req
   std::vector<std::filesystem::path> files = request.camera_files;
   files.insert(files.end(), request.meshes.begin(), request.meshes.end());
   const std::uint64_t memory = request.run.memory_bytes;
-  const SceneObjects objects = read_scene_objects(files, nullptr, memory);
-  const std::vector<MeshCamera> still = file_cameras(objects, {}, 0, memory);
+  const auto cameras_at = [&](const std::optional<Moment>& moment) {
+    return file_cameras(read_scene_objects(files, nullptr, memory, moment), moment, memory);
+  };
+  const std::vector<MeshCamera> still = cameras_at({});
   if (still.empty() && !is_named) return {};
   const std::size_t index = is_named ? index_of(still, request.camera_name) : 0;
   if (!request.sequence) return std::vector{still[index]};
   std::vector<MeshCamera> cameras;
-  const SequenceRequest& sequence = *request.sequence;
-  for (std::size_t i = 0; i < sequence.frames.count(); ++i) {
-    const auto frame = static_cast<double>(sequence.frames[i]);
-    cameras.push_back(
-        file_cameras(objects, frame, frame / sequence.frames_per_second, memory)[index]);
-  }
+  for (std::size_t i = 0; i < request.sequence->frames.count(); ++i)
+    cameras.push_back(cameras_at(moment_of(*request.sequence, i))[index]);
   return cameras;
 }
 

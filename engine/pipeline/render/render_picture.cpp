@@ -35,6 +35,7 @@ struct Part {
   bool emission = true;          ///< whether the meshes emit
   std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
   TextureTile tile;              ///< that is baked, if it is a texture
+  std::optional<Moment> moment;  ///< that is seen of a scene that moves
 };
 
 FilmExtras extras_of(const RenderRequest& request) {
@@ -129,8 +130,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
                                                            targets.front().path, progress);
   check_names(request, targets, lights.sky.map_path);
   const auto of_files = cameras_of_files(request, lighting.scene());
-  load_subject(subject, request, part.emission, lighting.scene(), lights.sky, targets.front().path,
-               progress);
+  load_subject(subject, request, part.moment, part.emission, lighting.scene(), lights.sky,
+               targets.front().path, progress);
   const std::vector<Camera> cameras =
       cameras_of_frames(request, lighting.scene(), of_files, subject);
   subject.camera = cameras.front();
@@ -211,7 +212,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
 
 /// Renders the light of each group of lights apart, into layers whose sum is the beauty.
 LightingReport render_groups(const RenderRequest& request, std::span<const PictureTarget> targets,
-                             Progress& progress) {
+                             const std::optional<Moment>& moment, Progress& progress) {
   const ContainerReader scene(with_directory_under(request.scene, request.run));
   const LightRig rig = request.lights
                            ? *request.lights
@@ -220,7 +221,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   Progress silent;
   const bool emits =
       may_emit(scene) ||
-      load_meshes(request.meshes, request.mesh.get(), {},
+      load_meshes(request.meshes, request.mesh.get(), {.moment = moment},
                   mesh_limits(request, rig.sky, targets.front().path), silent, nullptr, "meshes")
           .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
@@ -255,7 +256,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
         if (!sum) sum = std::make_unique<Film>(camera.width, camera.height, FilmExtras{});
         sum->add_group(group_channel(groups[i]), rows, first);
       };
-      const Part part{.emission = groups[i].empty(), .held_bytes = sum_bytes};
+      const Part part{.emission = groups[i].empty(), .held_bytes = sum_bytes, .moment = moment};
       add_costs(report, render_part(one, targets, part, add, progress));
     }
     PictureFiles files(of_frame, sum->width(), sum->height(), layer_types(*sum), one.exposure,
@@ -306,12 +307,56 @@ LightingReport render_tiles(const RenderRequest& request, std::span<const Pictur
       progress);
 }
 
-/// Renders a picture of a container, or bakes its textures.
+/// Renders pictures of a container, or bakes its textures.
+/// @param moment  that is seen of a scene that moves
 LightingReport render_container(const RenderRequest& request,
-                                std::span<const PictureTarget> targets, Progress& progress) {
-  if (request.light_groups) return render_groups(request, targets, progress);
+                                std::span<const PictureTarget> targets,
+                                const std::optional<Moment>& moment, Progress& progress) {
+  if (request.light_groups) return render_groups(request, targets, moment, progress);
   if (request.texture) return render_tiles(request, targets, progress);
-  return render_files(request, targets, {}, progress);
+  return render_files(request, targets, {.moment = moment}, progress);
+}
+
+/// Builds a temporary container of clouds and meshes, and renders it. The camera sees meshes as
+/// they are, unless there are clouds beside them.
+/// @param moment  as for render_container()
+LightingReport render_files_of_scene(const RenderRequest& request,
+                                     std::span<const PictureTarget> targets,
+                                     const std::optional<Moment>& moment, Progress& progress) {
+  const BuiltScene scene(request,
+                         {.backdrop = request.backdrop,
+                          .one_sided = request.one_sided,
+                          .moment = moment,
+                          .lights = request.lights,
+                          .note_lost_records = false},
+                         targets.front().path, progress);
+  RenderRequest rendering = request;
+  rendering.scene = scene.path();
+  rendering.joined.clear();
+  const std::vector<std::filesystem::path> files = scene_files(request);
+  const std::vector<std::filesystem::path> objects = object_files(files, request.run.memory_bytes);
+  if (rendering.meshes.empty() && !rendering.mesh && std::ranges::none_of(objects, holds_points)) {
+    rendering.meshes = files;
+  } else {
+    rendering.camera_files.insert(rendering.camera_files.end(), files.begin(), files.end());
+  }
+  LightingReport report = render_container(rendering, targets, moment, progress);
+  scene.add_stages(report.seconds);
+  return report;
+}
+
+/// Renders the frames of a scene that moves, each from a container of its own.
+LightingReport render_moving(const RenderRequest& request, std::span<const PictureTarget> targets,
+                             Progress& progress) {
+  LightingReport report;
+  RenderRequest one = request;
+  for (std::size_t i = 0; i < request.sequence->frames.count(); ++i) {
+    const std::int64_t frame = request.sequence->frames[i];
+    one.sequence->frames = {frame, frame};
+    add_run(report, render_files_of_scene(one, targets, moment_of(*request.sequence, i), progress));
+    if (!one.exposure) one.exposure = report.exposure;
+  }
+  return report;
 }
 
 }  // namespace
@@ -319,29 +364,23 @@ LightingReport render_container(const RenderRequest& request,
 LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
                               Progress& progress) {
   check_request(request, targets);
-  if (is_container_alone(request)) return render_container(request, targets, progress);
-  // Build a temporary container of clouds and meshes. The camera sees meshes as they are, unless
-  // there are clouds beside them.
-  check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
-  const std::vector<std::filesystem::path> files = scene_files(request);
-  const BuiltScene scene(request,
-                         {.backdrop = request.backdrop,
-                          .one_sided = request.one_sided,
-                          .lights = request.lights,
-                          .note_lost_records = false},
-                         targets.front().path, progress);
-  RenderRequest rendering = request;
-  rendering.scene = scene.path();
-  rendering.joined.clear();
-  const std::vector<std::filesystem::path> objects = object_files(files, request.run.memory_bytes);
-  if (rendering.meshes.empty() && !rendering.mesh && std::ranges::none_of(objects, holds_points)) {
-    rendering.meshes = files;
-  } else {
-    rendering.camera_files.insert(rendering.camera_files.end(), files.begin(), files.end());
+  const std::uint64_t memory = request.run.memory_bytes;
+  const auto move = [&](const std::vector<std::filesystem::path>& files) {
+    return request.sequence && moves(read_scene_objects(files, nullptr, memory), memory);
+  };
+  if (is_container_alone(request)) {
+    if (move(request.meshes)) {
+      progress.note(
+          "the meshes move, but the container does not: all frames show both as they stand. Name "
+          "the meshes in place of the container");
+    }
+    return render_container(request, targets, {}, progress);
   }
-  LightingReport report = render_container(rendering, targets, progress);
-  scene.add_stages(report.seconds);
-  return report;
+  check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
+  std::vector<std::filesystem::path> files = scene_files(request);
+  files.insert(files.end(), request.meshes.begin(), request.meshes.end());
+  if (move(files)) return render_moving(request, targets, progress);
+  return render_files_of_scene(request, targets, {}, progress);
 }
 
 }  // namespace ptc

@@ -39,6 +39,11 @@ std::optional<FrameMark> find_percent(const std::string& name) {
 
 }  // namespace
 
+Moment moment_of(const SequenceRequest& sequence, std::size_t index) {
+  const auto frame = static_cast<double>(sequence.frames[index]);
+  return {.frame = frame, .seconds = frame / sequence.frames_per_second};
+}
+
 void check_sequence(const SequenceRequest& sequence) {
   constexpr std::int64_t kFarthest = 1'000'000'000;
   constexpr std::size_t kMostFrames = 100'000;

@@ -11,6 +11,7 @@
 
 #include <glm/vec3.hpp>
 
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/render/picture_files.h"
 #include "engine/scene/camera.h"
 
@@ -39,6 +40,9 @@ struct SequenceRequest {
   /// that points up; frame 1 is the view without it. 0: it does not.
   unsigned turntable = 0;
 };
+
+/// Returns the moment of a frame. @param index  of the frame
+[[nodiscard]] Moment moment_of(const SequenceRequest& sequence, std::size_t index);
 
 /// @throws RequestError when a number is out of range or there are too many frames
 void check_sequence(const SequenceRequest& sequence);

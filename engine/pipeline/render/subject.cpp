@@ -43,11 +43,11 @@ MeshLimits mesh_limits(const RenderRequest& request, const Sky& sky,
           .temp_directory = roomiest_temp_dir(request.run, target)};
 }
 
-void load_subject(Subject& subject, const RenderRequest& request, bool emission,
-                  const ContainerReader& scene, const Sky& sky, const std::filesystem::path& target,
-                  Progress& progress) {
+void load_subject(Subject& subject, const RenderRequest& request,
+                  const std::optional<Moment>& moment, bool emission, const ContainerReader& scene,
+                  const Sky& sky, const std::filesystem::path& target, Progress& progress) {
   LoadedMeshes meshes =
-      load_meshes(request.meshes, request.mesh.get(), {request.backdrop, request.one_sided},
+      load_meshes(request.meshes, request.mesh.get(), {request.backdrop, request.one_sided, moment},
                   mesh_limits(request, sky, target), progress, nullptr, "meshes");
   if (meshes.parts) {
     progress.note("the meshes do not fit in memory: the camera sees the surfels");

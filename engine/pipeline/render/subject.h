@@ -43,12 +43,13 @@ struct Subject {
                                      const std::filesystem::path& target);
 
 /// Loads the meshes.
+/// @param moment    when they are seen, if they move
 /// @param emission  whether they emit
 /// @param target    as for roomiest_temp_dir()
 /// @throws as load_meshes(); RequestError when a texture is asked for and no mesh is in memory
-void load_subject(Subject& subject, const RenderRequest& request, bool emission,
-                  const ContainerReader& scene, const Sky& sky, const std::filesystem::path& target,
-                  Progress& progress);
+void load_subject(Subject& subject, const RenderRequest& request,
+                  const std::optional<Moment>& moment, bool emission, const ContainerReader& scene,
+                  const Sky& sky, const std::filesystem::path& target, Progress& progress);
 
 /// Prepares rays at the subject's mesh, and its lights.
 void trace_subject(Subject& subject, const RenderRequest& request, const Lighting& lighting,

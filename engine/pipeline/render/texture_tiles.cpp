@@ -27,30 +27,6 @@ std::vector<PictureTarget> targets_of(std::span<const PictureTarget> targets,
   return named;
 }
 
-/// Adds the costs and the checked receivers of a tile.
-void add_tile(LightingReport& report, const LightingReport& tile) {
-  const std::uint64_t receivers = report.receivers + tile.receivers;
-  add_costs(report, tile);
-  report.receivers = receivers;
-  report.settings = tile.settings;
-  report.exposure = tile.exposure;
-  // Tell of the tile that is farthest from what was asked
-  if (tile.tuning && (!report.tuning || report.tuning->met)) report.tuning = tile.tuning;
-  if (tile.damage && (!report.damage || report.damage->pages.empty())) report.damage = tile.damage;
-  if (!tile.check || tile.check->receivers == 0) return;
-  if (!report.check) {
-    report.check = tile.check;
-    return;
-  }
-  CheckReport& check = *report.check;
-  const auto before = static_cast<double>(check.receivers),
-             more = static_cast<double>(tile.check->receivers);
-  check.discs = pooled(check.discs, before, tile.check->discs, more);
-  if (check.mesh && tile.check->mesh)
-    check.mesh = pooled(*check.mesh, before, *tile.check->mesh, more);
-  check.receivers += tile.check->receivers;
-}
-
 }  // namespace
 
 std::vector<TextureTile> texture_tiles(const Mesh& mesh) {
@@ -93,7 +69,7 @@ LightingReport bake_tiles(std::span<const TextureTile> tiles,
     return bake(targets, {});
   }
   LightingReport report;
-  for (const TextureTile& tile : tiles) add_tile(report, bake(targets_of(targets, tile), tile));
+  for (const TextureTile& tile : tiles) add_run(report, bake(targets_of(targets, tile), tile));
   return report;
 }
 
