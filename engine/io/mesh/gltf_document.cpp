@@ -393,46 +393,51 @@ ByteRange GltfDocument::view(std::uint64_t index) {
   return buffer(view.buffer).part(view.offset, view.length);
 }
 
-GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::size_t components,
-                                                   std::optional<std::uint64_t> expected) {
-  // Check the shape of the elements
+GltfDocument::Elements GltfDocument::find_shape(std::uint64_t index, std::size_t components,
+                                                std::optional<std::uint64_t> expected) const {
   const Json& accessor = at("accessors", index);
   const std::string name = "accessor " + std::to_string(index);
-  if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
-  const auto view_index = unsigned_at(accessor, "bufferView");
-  if (!view_index) fail(name + " has no bufferView");
   const std::uint64_t type = unsigned_at(accessor, "componentType").value_or(0);
-  const std::optional<Component> component = component_of(type);
-  if (!component) fail(name + " has an unknown componentType");
+  if (!component_of(type)) fail(name + " has an unknown componentType");
   const auto shape = accessor.find("type");
   if (shape == accessor.end() || !shape->is_string() ||
       components_of(shape->get<std::string>()) != components) {
     fail(name + " is of the wrong type");
   }
+  const std::uint64_t count = unsigned_at(accessor, "count").value_or(0);
+  if (expected && count != *expected)
+    fail(name + " has another number of elements than the others beside it");
   const auto flag = accessor.find("normalized");
+  return {.count = count,
+          .components = components,
+          .type = type,
+          .normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>()};
+}
+
+GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::size_t components,
+                                                   std::optional<std::uint64_t> expected) {
+  const Json& accessor = at("accessors", index);
+  const std::string name = "accessor " + std::to_string(index);
+  if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
+  const auto view_index = unsigned_at(accessor, "bufferView");
+  if (!view_index) fail(name + " has no bufferView");
+  Elements found = find_shape(index, components, expected);
 
   // Check that all elements lie in the buffer view
   const View view = find_view(*view_index);
   const std::uint64_t offset = unsigned_at(accessor, "byteOffset").value_or(0);
-  const std::uint64_t element_bytes = component->bytes * components;
-  const std::uint64_t stride =
-      unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
-  const std::uint64_t elements = unsigned_at(accessor, "count").value_or(0);
-  if (expected && elements != *expected)
-    fail(name + " has another number of elements than the others beside it");
-  if (stride < element_bytes) fail(name + " has elements that overlap");
-  // This is (elements - 1) * stride + element_bytes > view.length - offset without overflow
-  if (elements > 0 && (offset > view.length || element_bytes > view.length - offset ||
-                       elements - 1 > (view.length - offset - element_bytes) / stride)) {
+  const std::uint64_t element_bytes = component_of(found.type)->bytes * components;
+  found.stride = unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
+  if (found.stride < element_bytes) fail(name + " has elements that overlap");
+  // This is (count - 1) * stride + element_bytes > view.length - offset without overflow
+  if (found.count > 0 &&
+      (offset > view.length || element_bytes > view.length - offset ||
+       found.count - 1 > (view.length - offset - element_bytes) / found.stride)) {
     fail(name + " reaches past its bufferView");
   }
-  return {.count = elements,
-          .components = components,
-          .buffer = view.buffer,
-          .offset = view.offset + offset,
-          .stride = stride,
-          .type = type,
-          .normalised = flag != accessor.end() && flag->is_boolean() && flag->get<bool>()};
+  found.buffer = view.buffer;
+  found.offset = view.offset + offset;
+  return found;
 }
 
 void GltfDocument::read(const Elements& elements,

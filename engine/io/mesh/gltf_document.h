@@ -84,6 +84,10 @@ class GltfDocument {
     std::uint64_t type = 0;                ///< componentType
     bool normalised = false;
   };
+  /// Finds what accessors[index] says of its elements, but not where they lie: its buffer, offset
+  /// and stride are 0. @throws as find_elements()
+  [[nodiscard]] Elements find_shape(std::uint64_t index, std::size_t components,
+                                    std::optional<std::uint64_t> expected = std::nullopt) const;
   /// Finds the elements of accessors[index].
   /// @param components  numbers in each element
   /// @param expected    number of elements that there must be, if it is known

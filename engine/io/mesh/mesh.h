@@ -159,7 +159,8 @@ struct MeshFile {
 };
 
 /// Reads a mesh file: OBJ with MTL, PLY, OFF, STL or glTF 2.0 (.gltf, .glb). Positions and
-/// transforms are computed in double. PLY, OFF and OBJ may be compressed (.ply.gz).
+/// transforms are computed in double. PLY, OFF and OBJ may be compressed (.ply.gz), meshes of glTF
+/// by Draco.
 ///
 /// The origin is the centre of the bounding box, rounded to integers. Polygons are triangulated,
 /// even concave ones. Degenerate triangles and vertices without a triangle are dropped. Every index

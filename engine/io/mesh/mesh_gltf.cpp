@@ -4,9 +4,11 @@
 //              |  `--> camera, light
 //              v
 //             mesh --> primitive --> accessors (positions, normals, texture coordinates, indices)
+//                          |    or a stream of Draco in their place
 //                          `--> material --> texture --> image
 //
-// GltfDocument follows the arrows and checks each index. walk_gltf_nodes() walks the nodes of the
+// GltfDocument follows the arrows and checks each index. GltfPrimitive reads the numbers of a
+// primitive, compressed or not. walk_gltf_nodes() walks the nodes of the
 // default scene and notes where meshes stand. GltfMesh appends every primitive to one MeshSoup, in
 // which all vertices have normals and texture coordinates of the same index: a mesh that stands in
 // two places is there twice. Where that would not fit in memory, such a mesh gets a soup of its
@@ -26,6 +28,7 @@
 #include "engine/io/mesh/gltf_document.h"
 #include "engine/io/mesh/gltf_materials.h"
 #include "engine/io/mesh/gltf_nodes.h"
+#include "engine/io/mesh/gltf_primitive.h"
 #include "engine/io/mesh/mesh_soup.h"
 
 namespace ptc {
@@ -40,7 +43,8 @@ struct Extension {
   bool understood;  // or else it can be left out with little harm, which is told
 };
 // Pictures in WebP have warnings of their own.
-constexpr std::array<Extension, 15> kExtensions = {{{"EXT_mesh_gpu_instancing", true},
+constexpr std::array<Extension, 16> kExtensions = {{{"EXT_mesh_gpu_instancing", true},
+                                                    {"KHR_draco_mesh_compression", true},
                                                     {"KHR_materials_emissive_strength", true},
                                                     {"KHR_materials_pbrSpecularGlossiness", true},
                                                     {"KHR_materials_unlit", true},
@@ -78,6 +82,7 @@ class GltfMesh {
     GltfNodes nodes =
         walk_gltf_nodes(document_, GltfSearch::all, room_.seconds, room_.memory_bytes, warnings_);
     uses_ = std::move(nodes.uses);
+    reserve_decoding();
     std::vector<PlacedMesh> placed;
     if (!copies_fit()) placed = read_placed();
     begin_soup();
@@ -113,27 +118,51 @@ class GltfMesh {
     return mesh_file(std::move(soup_), {}, {}, true);
   }
 
+  // Calls a function for each primitive of a mesh that has triangles.
+  void for_primitives(std::uint64_t index, const auto& take) {
+    const Json& mesh = document_.at("meshes", index);
+    const auto primitives = mesh.find("primitives");
+    if (primitives == mesh.end() || !primitives->is_array())
+      document_.fail("a mesh has no primitives");
+    for (const Json& json : *primitives) {
+      if (!json.is_object()) document_.fail("a primitive is not an object");
+      GltfPrimitive primitive(document_, json);
+      if (primitive.has_triangles()) take(json, primitive);
+    }
+  }
+
   // Counts the vertices and triangles of a mesh.
   std::pair<std::uint64_t, std::uint64_t> count_mesh(std::uint64_t index) {
     std::uint64_t vertices = 0, triangles = 0;
-    const auto count = [&](std::optional<std::uint64_t> accessor, std::size_t components) {
-      return accessor ? document_.find_elements(*accessor, components).count : 0;
-    };
-    const auto primitives = document_.at("meshes", index).find("primitives");
-    if (primitives == document_.at("meshes", index).end() || !primitives->is_array())
-      document_.fail("a mesh has no primitives");
-    for (const Json& primitive : *primitives) {
-      if (!primitive.is_object()) document_.fail("a primitive is not an object");
-      const Json* const attributes = GltfDocument::member(primitive, "attributes");
-      const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
-      if (attributes == nullptr || mode < 4) continue;
-      const std::uint64_t of = count(document_.unsigned_at(*attributes, "POSITION"), 3);
-      const auto indices = document_.unsigned_at(primitive, "indices");
-      const std::uint64_t corners = indices ? count(indices, 1) : of;
-      vertices += std::min<std::uint64_t>(of, MeshSoup::kNone);
-      triangles += std::min<std::uint64_t>(mode == 4 ? corners / 3 : corners, MeshSoup::kNone);
-    }
+    for_primitives(index, [&](const Json& /*json*/, const GltfPrimitive& primitive) {
+      const std::uint64_t corners = primitive.corners();
+      vertices += std::min<std::uint64_t>(primitive.vertices(), MeshSoup::kNone);
+      triangles +=
+          std::min<std::uint64_t>(primitive.mode() == 4 ? corners / 3 : corners, MeshSoup::kNone);
+    });
     return {vertices, triangles};
+  }
+
+  // Takes off the memory in which compressed primitives are decoded, one after another.
+  void reserve_decoding() {
+    std::set<std::uint64_t> meshes;
+    for (const GltfUse& use : uses_) meshes.insert(use.mesh);
+    std::uint64_t bytes = 0;
+    for (const std::uint64_t mesh : meshes) {
+      for_primitives(mesh, [&](const Json& /*json*/, const GltfPrimitive& primitive) {
+        if (!primitive.is_compressed()) return;
+        check_growth(primitive.vertices());  // before the shape is multiplied
+        check_growth(primitive.corners() / 3);
+        bytes = std::max(bytes, primitive.decode_bytes());
+      });
+    }
+    if (bytes > room_.memory_bytes) {
+      throw LimitError(document_.path().string() +
+                       ": a Draco-compressed mesh does not fit in `run.memory_bytes`: to decode it "
+                       "takes " +
+                       std::to_string((bytes >> 20) + 1) + " MiB");
+    }
+    room_.memory_bytes -= bytes;
   }
 
   // Says whether a copy of each mesh for each of its places fits in memory, or makes no difference.
@@ -218,48 +247,27 @@ class GltfMesh {
   }
 
   void add_mesh(std::uint64_t index, const glm::dmat4& world) {
-    const Json& mesh = document_.at("meshes", index);
-    const auto primitives = mesh.find("primitives");
-    if (primitives == mesh.end() || !primitives->is_array())
-      document_.fail("a mesh has no primitives");
-    for (const Json& primitive : *primitives) {
-      if (!primitive.is_object()) document_.fail("a primitive is not an object");
-      add_primitive(primitive, world);
-    }
-  }
-
-  void add_primitive(const Json& primitive, const glm::dmat4& world) {
-    const std::uint64_t mode = document_.unsigned_at(primitive, "mode").value_or(4);
-    if (mode < 4) return;  // points and lines
-    if (mode > 6) document_.fail("the mode of a primitive is unknown");
-    if (GltfDocument::extension(primitive, "KHR_draco_mesh_compression") != nullptr) {
-      document_.fail("Draco-compressed meshes are not supported");
-    }
-    const Json* const attributes = GltfDocument::member(primitive, "attributes");
-    const auto position =
-        attributes == nullptr ? std::nullopt : document_.unsigned_at(*attributes, "POSITION");
-    if (!position) return;
-    const GltfMaterial& material =
-        materials_.use(document_.unsigned_at(primitive, "material"), soup_);
-    const std::uint64_t base = soup_.positions.size();
-    const std::uint64_t count = add_vertices(*attributes, *position, material, world);
-    add_triangles(primitive, mode, base, count, material, mirrors(world));
+    for_primitives(index, [&](const Json& json, GltfPrimitive& primitive) {
+      const GltfMaterial& material = materials_.use(document_.unsigned_at(json, "material"), soup_);
+      const std::uint64_t base = soup_.positions.size();
+      check_growth(primitive.vertices());
+      primitive.decode();
+      add_vertices(primitive, material, world);
+      add_triangles(primitive, base, material, mirrors(world));
+    });
   }
 
   // Appends positions, normals and texture coordinates, as many of each; missing ones are 0.
-  std::uint64_t add_vertices(const Json& attributes, std::uint64_t position,
-                             const GltfMaterial& material, const glm::dmat4& world) {
-    const GltfDocument::Elements positions = document_.find_elements(position, 3);
-    check_growth(positions.count);
-    document_.read(positions, [&](std::span<const double> p) {
+  void add_vertices(const GltfPrimitive& primitive, const GltfMaterial& material,
+                    const glm::dmat4& world) {
+    primitive.read("POSITION", 3, [&](std::span<const double> p) {
       soup_.add_position(glm::dvec3(world * glm::dvec4(p[0], p[1], p[2], 1)));
     });
-    add_normals(attributes, positions.count, world);
+    add_normals(primitive, world);
     soup_.normals.grow(soup_.positions.size(), glm::vec3(0));
-    add_uvs(attributes, positions.count, material);
+    add_uvs(primitive, material);
     soup_.uvs.grow(soup_.positions.size(), glm::vec2(0));
-    add_colours(attributes, positions.count, material);
-    return positions.count;
+    add_colours(primitive, material);
   }
 
   // Returns the vertices or corners that the size of the files justifies.
@@ -277,23 +285,21 @@ class GltfMesh {
     }
   }
 
-  void add_normals(const Json& attributes, std::uint64_t count, const glm::dmat4& world) {
-    const auto index = document_.unsigned_at(attributes, "NORMAL");
-    if (!index) return;
+  void add_normals(const GltfPrimitive& primitive, const glm::dmat4& world) {
+    if (!primitive.has("NORMAL")) return;
     const glm::dmat3 turn = normal_transform(world);
-    document_.read(document_.find_elements(*index, 3, count), [&](std::span<const double> n) {
+    primitive.read("NORMAL", 3, [&](std::span<const double> n) {
       soup_.add_normal(glm::vec3(turn * glm::dvec3(n[0], n[1], n[2])));
     });
   }
 
-  void add_uvs(const Json& attributes, std::uint64_t count, const GltfMaterial& material) {
+  void add_uvs(const GltfPrimitive& primitive, const GltfMaterial& material) {
     const std::string key = "TEXCOORD_" + std::to_string(material.place.uv_set);
-    const auto index = document_.unsigned_at(attributes, key.c_str());
-    if (!index) return;
+    if (!primitive.has(key.c_str())) return;
     has_uvs_ = true;
     const double cosine = std::cos(material.place.rotation);
     const double sine = std::sin(material.place.rotation);
-    document_.read(document_.find_elements(*index, 2, count), [&](std::span<const double> uv) {
+    primitive.read(key.c_str(), 2, [&](std::span<const double> uv) {
       const glm::dvec2 scaled = material.place.scale * glm::dvec2(uv[0], uv[1]);
       const double u = material.place.offset.x + cosine * scaled.x + sine * scaled.y;
       const double v = material.place.offset.y - sine * scaled.x + cosine * scaled.y;
@@ -302,27 +308,28 @@ class GltfMesh {
   }
 
   // Adds the colours of vertices, whose positions are there; alpha is left out.
-  void add_colours(const Json& attributes, std::uint64_t count, const GltfMaterial& material) {
-    const auto index = document_.unsigned_at(attributes, "COLOR_0");
+  void add_colours(const GltfPrimitive& primitive, const GltfMaterial& material) {
+    const auto index = primitive.accessor("COLOR_0");
     if (!index) return;
     const Json& accessor = document_.at("accessors", *index);
-    if (accessor.contains("sparse") || !accessor.contains("bufferView")) {
+    if (!primitive.is_compressed("COLOR_0") &&
+        (accessor.contains("sparse") || !accessor.contains("bufferView"))) {
       warnings_.add(kColoursLeftOut, "accessor " + std::to_string(*index));
       return;
     }
     const bool has_alpha = accessor.contains("type") && accessor["type"] == "VEC4";
     if (has_alpha && material.alpha)
       warnings_.add(kAlphaLeftOut, "accessor " + std::to_string(*index));
-    std::uint64_t vertex = soup_.positions.size() - count;
-    document_.read(document_.find_elements(*index, has_alpha ? 4 : 3, count),
-                   [&](std::span<const double> c) {
-                     soup_.add_colour(vertex++, {c[0], c[1], c[2]});
-                   });
+    std::uint64_t vertex = soup_.positions.size() - primitive.vertices();
+    primitive.read("COLOR_0", has_alpha ? 4 : 3, [&](std::span<const double> c) {
+      soup_.add_colour(vertex++, {c[0], c[1], c[2]});
+    });
   }
 
   // Adds the triangles of a list, strip or fan.
-  void add_triangles(const Json& primitive, std::uint64_t mode, std::uint64_t base,
-                     std::uint64_t count, const GltfMaterial& material, bool mirrored) {
+  void add_triangles(const GltfPrimitive& primitive, std::uint64_t base,
+                     const GltfMaterial& material, bool mirrored) {
+    const std::uint64_t mode = primitive.mode();
     std::array<std::uint64_t, 3> last{};  // vertices; the oldest, or the first of a fan, in front
     std::uint64_t seen = 0;
     const auto add = [&](std::uint64_t vertex) {
@@ -345,19 +352,7 @@ class GltfMesh {
       }
       soup_.add_polygon(triangle, material.index);
     };
-
-    // Follow the indices, or count up without them
-    const auto accessor = document_.unsigned_at(primitive, "indices");
-    if (!accessor) {
-      for (std::uint64_t i = 0; i < count; ++i) add(i);
-      return;
-    }
-    document_.read(document_.find_elements(*accessor, 1), [&](std::span<const double> index) {
-      if (!(index[0] >= 0 && index[0] < static_cast<double>(count))) {
-        document_.fail("an index refers to no vertex");
-      }
-      add(static_cast<std::uint64_t>(index[0]));
-    });
+    primitive.read_corners(add);
   }
 
   GltfDocument document_;
