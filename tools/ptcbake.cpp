@@ -1,8 +1,11 @@
-// ptcbake: bakes the light of a scene into a texture of its meshes.
+// ptcbake: bakes the light of a scene into a texture or the vertices of its meshes.
+#include <algorithm>
 #include <array>
+#include <string>
 #include <string_view>
 
 #include "engine/base/error.h"
+#include "engine/io/text/text.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/render/render_picture.h"
@@ -17,19 +20,25 @@
 namespace {
 
 constexpr char kPurpose[] =
-    "Bakes occlusion, irradiance and bent normals into a texture of a mesh.\n"
-    "Each texel is shaded at its place on the surface, as ptcrender shades a pixel. The mesh needs "
-    "texture coordinates that cover the texture without overlap.\n"
+    "Bakes occlusion, irradiance and bent normals into a texture or the vertices of a mesh.\n"
+    "Each texel or vertex is shaded at its place on the surface, as ptcrender shades a pixel. For "
+    "a "
+    "texture the mesh needs texture coordinates that cover it without overlap.\n"
     "\n"
     "An .exr holds the layers irradiance, direct, indirect, occlusion, bent_normal, albedo and "
     "alpha, and as picture the radiance that leaves the surface. A .png holds one of the layers. "
     "Texels next to an island show its edge; alpha leaves them out. With <UDIM> in the name of "
-    "the output there is a file for each tile of the texture coordinates: 1001, 1002 and so on.";
+    "the output there is a file for each tile of the texture coordinates: 1001, 1002 and so on.\n"
+    "\n"
+    "A .ply holds the mesh with all of these at its vertices, and with colours as a picture has "
+    "them. A .glb holds the mesh with COLOR_0: the light by which the base colour is multiplied.";
 constexpr char kExamples[] =
     "  # Bake the light of a room, and its occlusion as a PNG\n"
     "  ptcbake room.obj -o room.exr --layer occlusion=ao.png\n"
     "  # Bake a prop where it stands in a scene that was built before\n"
     "  ptcbake scene.ptcx --mesh prop.glb --size 2048 -o prop.exr\n"
+    "  # Bake the vertices of a mesh, and its occlusion as COLOR_0\n"
+    "  ptcbake statue.ply -o lit.ply --layer occlusion=statue.glb\n"
     "  # Bake each tile of a character under the sky of a picture\n"
     "  ptcbake character.obj --sky sunset.exr -o 'light.<UDIM>.exr'\n";
 
@@ -52,11 +61,12 @@ void declare(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   arguments.scene.declare(command,
                           "Container, clouds or meshes whose surfels give the indirect light");
-  command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png"},
-                      "Texture to write (.exr with all layers, or .png); repeatable");
-  ptc::add_layers(app, arguments.layers, kLayers);
+  command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png", ".ply", ".glb"},
+                      "Texture or mesh to write; repeatable\n"
+                      "write; repeatable");
+  ptc::add_layers(app, arguments.layers, kLayers, {".png", ".glb", ".ply"});
   command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
-                     "Mesh whose texture is baked; repeatable\n"
+                     "Mesh that is baked; repeatable\n"
                      "By default that is the meshes of SCENE, when it has no container.");
   ptc::add_one_sided(app, request.one_sided);
   constexpr char kGroup[] = "Texture";
@@ -72,11 +82,26 @@ void declare(ptc::Command& command, Arguments& arguments) {
   ptc::add_light_sampling(app, request.light_sampling);
 }
 
-/// Bakes the texture and reports it.
+/// Says whether the outputs are meshes. @throws ptc::RequestError when only some of them are
+bool bakes_vertices(const Arguments& arguments) {
+  std::vector<std::filesystem::path> paths = arguments.outputs;
+  for (const ptc::PictureTarget& target : arguments.layers) paths.push_back(target.path);
+  const auto meshes = std::ranges::count_if(paths, [](const std::filesystem::path& path) {
+    const std::string ending = ptc::lower_extension(path);
+    return ending == ".ply" || ending == ".glb";
+  });
+  if (meshes > 0 && meshes != std::ssize(paths))
+    throw ptc::RequestError("targets",
+                            "a run bakes a texture or vertices: name pictures or meshes");
+  return meshes > 0;
+}
+
+/// Bakes the texture or the vertices, and reports them.
 ptc::Outcome bake(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   ptc::RenderRequest& request = arguments.request;
   request.run = run;
-  request.texture = arguments.texture;
+  request.vertices = bakes_vertices(arguments);
+  if (!request.vertices) request.texture = arguments.texture;
   arguments.scene.apply(request, arguments.outputs.front(), progress);
   if (arguments.lights.given()) {
     request.lights = arguments.lights.rig(ptc::up_of_files(ptc::scene_files(request), request.up),

@@ -336,18 +336,21 @@ void add_light_sampling(CLI::App& app, LightSampling& sampling) {
 }
 
 CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
-                        std::span<const std::string_view> names) {
+                        std::span<const std::string_view> names,
+                        const std::vector<std::string>& endings) {
   std::vector<std::string> words;
   for (const std::string_view name : names) words.push_back(std::string(name) + "=");
   const std::string told = join({words.begin(), words.end() - 1}, ", ") + " or " + words.back();
-  words.emplace_back(".png");
-  const auto check = [names, told](const std::string& text) {
+  words.insert(words.end(), endings.begin(), endings.end());
+  const auto check = [names, told, endings](const std::string& text) {
     const std::size_t equals = text.find('=');
     const bool known =
-        std::ranges::find(names, text.substr(0, equals)) != names.end() && has_ending(text, ".png");
+        std::ranges::find(names, text.substr(0, equals)) != names.end() &&
+        std::ranges::any_of(endings, [&](const auto& ending) { return has_ending(text, ending); });
     return known && equals != std::string::npos
                ? std::string()
-               : "expects " + told + " and the name of a .png, not '" + text + "'";
+               : "expects " + told + " and the name of a " + join(endings, " or ") + ", not '" +
+                     text + "'";
   };
   const auto set = [&layers](const std::vector<std::string>& values) {
     for (const std::string& text : values) {
@@ -357,7 +360,8 @@ CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
   };
   CLI::Option* option = app.add_option_function<std::vector<std::string>>(
       "--layer", set,
-      "Also write a layer as PNG; repeatable\nLAYER is " + told +
+      "Also write a layer as " + std::string(endings.size() > 1 ? "PNG or mesh" : "PNG") +
+          "; repeatable\nLAYER is " + told +
           (std::ranges::find(names, "reflection") != names.end() ? " (with --glossy)." : "."));
   return offer(option, words)
       ->type_name("LAYER=FILE")

@@ -82,10 +82,12 @@ void add_shadow_rays(CLI::App& app, LightSampling& sampling);
 /// Declares --sun-rays, --area-rays and --sky-rays.
 void add_light_sampling(CLI::App& app, LightSampling& sampling);
 
-/// Declares --layer, which takes the name of a layer and of a PNG.
-/// @param names  of the layers; must outlive the parsing
+/// Declares --layer, which takes the name of a layer and of a file.
+/// @param names    of the layers; must outlive the parsing
+/// @param endings  that the name of the file may have
 CLI::Option* add_layers(CLI::App& app, std::vector<PictureTarget>& layers,
-                        std::span<const std::string_view> names);
+                        std::span<const std::string_view> names,
+                        const std::vector<std::string>& endings = {".png"});
 /// Declares --exposure. @param exposure  stays empty unless it is given
 CLI::Option* add_exposure(CLI::App& app, std::optional<float>& exposure);
 /// Declares --one-sided.

@@ -1,13 +1,20 @@
 // Textures that are baked: where texels lie, what they hold, and what is refused.
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/render/render_picture.h"
 #include "tests/support/channels.h"
@@ -79,6 +86,42 @@ class Bake {
  private:
   test::TemporaryDirectory scratch_;
 };
+
+// The values of each vertex of a binary PLY by their names, and the number of its vertices.
+struct BakedPly {
+  std::size_t vertices = 0;
+  std::map<std::string, std::vector<double>> values;
+};
+
+BakedPly read_ply(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  REQUIRE(file);
+  BakedPly ply;
+  std::vector<std::pair<std::string, std::string>> properties;  // type, name
+  std::string line;
+  while (std::getline(file, line) && !line.starts_with("element face")) {
+    std::istringstream words(line);
+    std::string word, type, name;
+    words >> word >> type >> name;
+    if (word == "element") ply.vertices = std::stoul(name);
+    if (word == "property") properties.emplace_back(type, name);
+  }
+  while (std::getline(file, line) && line != "end_header") {
+  }
+  const auto read = [&]<typename T>(T value) {
+    file.read(reinterpret_cast<char*>(&value), sizeof(T));
+    return static_cast<double>(value);
+  };
+  for (std::size_t i = 0; i < ply.vertices; ++i) {
+    for (const auto& [type, name] : properties) {
+      ply.values[name].push_back(type == "double"  ? read(double{})
+                                 : type == "float" ? read(float{})
+                                                   : read(std::uint8_t{}));
+    }
+  }
+  REQUIRE(file);
+  return ply;
+}
 
 }  // namespace
 
@@ -200,7 +243,7 @@ TEST_CASE("bake: a cap that is too small for the mesh and its texture is refused
   Bake bake(mesh);
   bake.request.size = {16384, 16384};
   bake.request.run.memory_bytes = std::uint64_t{40} << 20;
-  CHECK_THROWS_WITH(bake.run(), Catch::Contains("the mesh in its texture"));
+  CHECK_THROWS_WITH(bake.run(), Catch::Contains("the mesh as it is baked"));
 }
 
 TEST_CASE("bake: parts that share texels are noted", "[integration][bake]") {
@@ -270,4 +313,134 @@ TEST_CASE("bake: what cannot be baked is refused", "[integration][bake]") {
     bake.request.light_groups = true;
     refused("light_groups", "for pictures");
   }
+}
+
+TEST_CASE("bake: vertices have the light of the surface around them, in a .ply and a .glb",
+          "[integration][bake]") {
+  // A floor of 8 x 8 squares far from the origin, and a lid above a quarter of it
+  constexpr int kSquares = 8;
+  const glm::dvec3 origin(500'000, 100, -300'000);
+  Mesh mesh;
+  mesh.origin = origin;
+  for (int y = 0; y <= kSquares; ++y) {
+    for (int x = 0; x <= kSquares; ++x) {
+      mesh.positions.emplace_back(0.25 * x - 1.0, 0, 0.25 * y - 1.0);
+      mesh.uvs.emplace_back(x / 8.0, y / 8.0);
+      mesh.normals.emplace_back(0, 1, 0);
+    }
+  }
+  constexpr std::uint32_t kRow = kSquares + 1;
+  for (std::uint32_t i = 0; i + kRow < mesh.positions.size(); ++i) {
+    if (i % kRow == kSquares) continue;
+    mesh.triangles.push_back({i, i + kRow, i + 1});
+    mesh.triangles.push_back({i + 1, i + kRow, i + kRow + 1});
+  }
+  mesh.material_of.assign(mesh.triangles.size(), 0);
+  mesh.materials = {{.name = "floor", .albedo = glm::vec3(0.5F, 0.25F, 1)},
+                    {.name = "lid", .albedo = glm::vec3(0), .emission = {2, 4, 1}}};
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const glm::vec2 at : {glm::vec2(-1, -1), {-1, 0}, {0, -1}, {0, 0}}) {
+    mesh.positions.emplace_back(at.x, 0.15F, at.y);
+    mesh.uvs.emplace_back(0);
+    mesh.normals.emplace_back(0, 1, 0);
+  }
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  mesh.triangles.push_back({first + 2, first + 1, first + 3});
+  mesh.material_of.resize(mesh.triangles.size(), 1);
+  Bake bake(mesh);
+  bake.request.texture.reset();
+  bake.request.size.reset();
+  bake.request.vertices = true;
+  const std::vector<PictureTarget> targets{{bake.path("a.ply")},
+                                           {bake.path("a.glb"), "irradiance"},
+                                           {bake.path("occlusion.glb"), "occlusion"}};
+  const LightingReport report = render_picture(bake.request, targets, bake.notes);
+  CHECK(report.receivers == 4 * mesh.positions.size());
+
+  // The PLY has positions in double, all values, and what they are
+  const BakedPly ply = read_ply(bake.path("a.ply"));
+  REQUIRE(ply.vertices == mesh.positions.size());
+  const auto value = [&](const char* name, std::size_t i) { return ply.values.at(name)[i]; };
+  for (std::size_t i = 0; i < ply.vertices; ++i) {
+    const glm::vec3& p = mesh.positions[i];
+    CHECK(glm::dvec3(value("x", i), value("y", i), value("z", i)) == origin + glm::dvec3(p));
+    CHECK(value("t", i) == static_cast<double>(mesh.uvs[i].y));
+    const bool is_floor = i < first;
+    CHECK(value("albedo_r", i) == Approx(is_floor ? 0.5 : 0));
+    if (!is_floor || p.x >= 0.25F || p.z >= 0.25F) {
+      INFO(p.x << ' ' << p.z);
+      CHECK(value("irradiance_g", i) > 0.5 * std::numbers::pi);
+      CHECK(value("occlusion", i) < 0.5);
+      CHECK(value("bent_normal_y", i) > 0.7);
+    } else if (p.x == -0.5F && p.z == -0.5F) {
+      // Four times the form factor of a rectangle of a x a above its corner, at height h
+      const double a = 0.5, h = 0.15, far = std::hypot(a, h);
+      CHECK(value("occlusion", i) ==
+            Approx(4 / std::numbers::pi * (a / far) * std::atan(a / far)).margin(0.03));
+    }
+    if (!is_floor)
+      CHECK(value("radiance_g", i) == Approx(4).margin(0.01));
+    else
+      CHECK(value("radiance_g", i) ==
+            Approx(0.25 * value("irradiance_g", i) / std::numbers::pi).margin(1e-4));
+    CHECK(value("red", i) <= 255);
+  }
+  const std::size_t far_corner = first - 1;
+  CHECK(value("irradiance_g", far_corner) == Approx(std::numbers::pi).epsilon(0.03));
+  CHECK(read_mesh(bake.path("a.ply")).mesh.triangles.size() == mesh.triangles.size());
+
+  // The GLB has the same light as COLOR_0; reading numbers the vertices as triangles use them
+  REQUIRE(report.exposure);
+  const Mesh lit = read_mesh(bake.path("a.glb")).mesh,
+             occluded = read_mesh(bake.path("occlusion.glb")).mesh;
+  std::vector<std::uint32_t> number(mesh.positions.size());
+  for (const Mesh* const read : {&lit, &occluded}) {
+    REQUIRE(read->positions.size() == mesh.positions.size());
+    REQUIRE(read->colours.size() == mesh.positions.size());
+    REQUIRE(read->triangles.size() == mesh.triangles.size());
+    CHECK(read->material_of == mesh.material_of);
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t there = read->triangles[i][k], here = mesh.triangles[i][k];
+        number[here] = there;
+        CHECK(read->uvs[there] == mesh.uvs[here]);
+        CHECK(read->normals[there] == mesh.normals[here]);
+        CHECK(read->origin + glm::dvec3(read->positions[there]) ==
+              origin + glm::dvec3(mesh.positions[here]));
+      }
+    }
+  }
+  CHECK(lit.materials[1].emission == mesh.materials[1].emission);
+  CHECK(lit.materials[0].albedo == mesh.materials[0].albedo);
+  CHECK(lit.materials[0].name == "floor");
+  double most = 0;
+  const double gain = std::exp2(static_cast<double>(*report.exposure)) / std::numbers::pi;
+  for (std::size_t i = 0; i < ply.vertices; ++i) {
+    const glm::vec3 light = lit.colours[number[i]];
+    CHECK(static_cast<double>(occluded.colours[number[i]].r) ==
+          Approx(1 - value("occlusion", i)).margin(1e-6));
+    CHECK(static_cast<double>(light.b) ==
+          Approx(std::min(1.0, gain * value("irradiance_b", i))).margin(1e-4));
+    most = std::max(most, static_cast<double>(light.g));
+  }
+  CHECK(most <= 1);
+  CHECK(most > 0.8);
+}
+
+TEST_CASE("bake: what baking vertices cannot do is refused", "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {0, 0}, {1, 1});
+  Bake bake(mesh);
+  bake.request.vertices = true;
+  CHECK_THROWS_WITH(bake.run("a.ply"), Catch::Contains("a texture or vertices, not both"));
+  bake.request.texture.reset();
+  CHECK_THROWS_WITH(bake.run("a.ply"), Catch::Contains("vertices have none"));
+  bake.request.size.reset();
+  CHECK_THROWS_WITH(bake.run("a.exr"), Catch::Contains("must end in .ply or .glb"));
+  bake.request.run.memory_bytes = 1 << 20;
+  CHECK_THROWS_WITH(bake.run("a.ply"), Catch::Contains("too small"));
+  CHECK_FALSE(std::filesystem::exists(bake.path("a.ply")));
+  bake.request.run.memory_bytes = 1 << 30;
+  bake.run("a.ply");
+  CHECK(read_ply(bake.path("a.ply")).vertices == 4);
 }

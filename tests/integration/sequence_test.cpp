@@ -374,5 +374,5 @@ TEST_CASE("sequence: what contradicts itself is refused", "[integration][sequenc
   scene.request.glossy.roughness.reset();
   scene.request.check.receivers = 0;
   scene.request.texture = TextureTarget{};
-  CHECK_THROWS_WITH(scene.render({"a#.exr"}), Contains("a texture has none"));
+  CHECK_THROWS_WITH(scene.render({"a#.exr"}), Contains("what is baked has none"));
 }

@@ -41,10 +41,17 @@ std::size_t index_of(const std::vector<MeshCamera>& cameras, const std::string& 
 Camera fixed_camera(const RenderRequest& request, const ContainerReader& scene,
                     const Subject& subject) {
   if (request.camera) return *request.camera;
-  if (request.texture) {
+  if (request.bakes()) {
     constexpr unsigned kSide = 1024;
     const Bounds box = subject.mesh.bounds();
-    return {.position = 0.5 * (box.low + box.high), .width = kSide, .height = kSide};
+    Camera camera{.position = 0.5 * (box.low + box.high), .width = kSide, .height = kSide};
+    if (request.vertices) {
+      // As wide as a tile, so that the vertices of one follow one another
+      camera.width = TileRenderer::tile_of(1, subject.side).width;
+      camera.height =
+          static_cast<unsigned>((subject.mesh.positions.size() + camera.width - 1) / camera.width);
+    }
+    return camera;
   }
   std::optional<Bounds> box;
   if (request.backdrop && subject.has_mesh()) box = bounds_before_backdrop(subject.mesh);
@@ -72,7 +79,7 @@ glm::dvec3 middle_of(const RenderRequest& request, const ContainerReader& scene,
 
 std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& request,
                                                         const ContainerReader& scene) {
-  if (request.camera || request.texture) return {};
+  if (request.camera || request.bakes()) return {};
   const bool is_named = !request.camera_name.empty();
   if (!is_named && request.camera_files.empty() && scene.meta().text.contains(kCameraKey))
     return {};
@@ -115,7 +122,7 @@ std::vector<Camera> cameras_of_frames(const RenderRequest& request, const Contai
       camera.width = (*request.size)[0];
       camera.height = (*request.size)[1];
     }
-    check_size(camera);
+    if (!request.vertices) check_size(camera);
   }
   return cameras;
 }

@@ -22,7 +22,11 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
   bool exr = false;
   for (const PictureTarget& target : targets) {
     const std::string ending = lower_extension(target.path);
-    if (ending != ".exr" && ending != ".png") {
+    if (request.vertices && ending != ".ply" && ending != ".glb") {
+      throw RequestError("targets", "the name of a baked mesh must end in .ply or .glb, but is " +
+                                        target.path.string());
+    }
+    if (!request.vertices && ending != ".exr" && ending != ".png") {
       throw RequestError("targets", "the name of a picture must end in .exr or .png, but is " +
                                         target.path.string());
     }
@@ -34,10 +38,10 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
           "targets",
           "the layer 'reflection' needs a roughness: ask for `glossy.roughness` as well");
     }
-    if (target.layer == "irradiance" && !request.texture) {
+    if (target.layer == "irradiance" && !request.bakes()) {
       throw RequestError("targets", "a picture has no layer 'irradiance': only a texture has it");
     }
-    exr |= ending == ".exr";
+    exr |= ending == ".exr" || ending == ".ply";
   }
   if (!request.shadows.empty() && !exr) {
     throw RequestError("shadows",
@@ -89,16 +93,20 @@ void check_request(const RenderRequest& request, std::span<const PictureTarget> 
   if (request.camera) check_camera(*request.camera, "camera");
   if (request.sequence) {
     check_sequence(*request.sequence);
-    require_request(!request.texture, "sequence.frames",
-                    "`sequence.frames` are for pictures: a texture has none");
+    require_request(!request.bakes(), "sequence.frames",
+                    "`sequence.frames` are for pictures: what is baked has none");
     require_request(!request.glossy.roughness || request.check.receivers == 0, "check",
                     "`check` compares reflections of one picture: leave out the frames");
     static_cast<void>(targets_of_frame(targets, request.sequence->frames.first));
   }
   require_request(!request.camera || request.camera_name.empty(), "camera_name",
                   "`camera_name` and a camera exclude each other");
-  require_request(!request.texture || !request.light_groups, "light_groups",
-                  "`light_groups` is for pictures: a texture has no layers for them");
+  require_request(!request.bakes() || !request.light_groups, "light_groups",
+                  "`light_groups` is for pictures: what is baked has no layers for them");
+  require_request(!request.vertices || !request.texture, "texture",
+                  "a run bakes a texture or vertices, not both");
+  require_request(!request.vertices || !request.size, "size",
+                  "`size` is for pictures and textures: vertices have none");
   static_cast<void>(side_of(request.samples));
 }
 

@@ -20,6 +20,7 @@
 #include "engine/pipeline/render/shots.h"
 #include "engine/pipeline/render/subject.h"
 #include "engine/pipeline/render/tile_renderer.h"
+#include "engine/pipeline/render/vertex_files.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shading_channels.h"
 
@@ -41,7 +42,7 @@ struct Part {
 FilmExtras extras_of(const RenderRequest& request) {
   FilmExtras extras{.estimates = request.estimate,
                     .glossy = request.glossy.roughness.has_value(),
-                    .irradiance = request.texture.has_value()};
+                    .irradiance = request.bakes()};
   for (const std::string& group : request.shadows) extras.shadows.push_back(shadow_channel(group));
   return extras;
 }
@@ -71,21 +72,23 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
     budget.charge("the picture of all groups", subject.pixels() * part.held_bytes);
   } else {
     budget.charge("the files of the picture",
-                  PictureFiles::bytes(targets, camera.width, layer_types(Film(1, 1, extras))));
+                  request.vertices ? VertexFiles::bytes(targets)
+                                   : PictureFiles::bytes(targets, camera.width,
+                                                         layer_types(Film(1, 1, extras))));
   }
   if (subject.rays) {
     charge_mesh(budget, subject.mesh, subject.rays.get());
-    if (request.texture) budget.charge("the mesh in its texture", subject.texture_bytes);
+    if (request.bakes()) budget.charge("the mesh as it is baked", subject.baked_bytes);
   } else {
     budget.charge("the depth buffer", view.depth);
     if (view.pages > 0) budget.charge("pages that the camera sees", view.pages);
   }
   return budget;
 }
-/// Gets complete rows of the picture that a camera sees, from the top down.
+/// Gets complete rows of a picture of a subject, from the top down.
 /// @param frame  index of the picture
-using RowsSeen =
-    std::function<void(const Film& rows, unsigned first, const Camera& camera, std::size_t frame)>;
+using RowsSeen = std::function<void(const Film& rows, unsigned first, const Subject& subject,
+                                    std::size_t frame)>;
 
 /// Makes a view of the subject from its camera.
 /// @param progress  advances by one for each sample of a view of surfels
@@ -93,8 +96,10 @@ void see(Subject& subject, const RenderRequest& request, const Part& part,
          const SurfelViewBytes& bytes, const Lighting& lighting, Progress& progress) {
   if (!subject.has_mesh()) {
     see_surfels(subject, request.lift, bytes, lighting, progress);
-  } else if (!request.texture) {
+  } else if (!request.bakes()) {
     see_mesh(subject);
+  } else if (request.vertices) {
+    see_vertices(subject, request);
   } else if (!subject.view) {
     see_texture(subject, request, part.tile, lighting.executor(), progress);
   }
@@ -189,12 +194,11 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
       TileRenderer({.camera = subject.camera,
                     .side = subject.side,
                     .view = *subject.view,
-                    .sky = !request.texture},
+                    .sky = !request.bakes()},
                    subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting)
           .render_all(
               extras_of(request),
-              [&](const Film& rows, unsigned first) { done(rows, first, subject.camera, i); },
-              progress);
+              [&](const Film& rows, unsigned first) { done(rows, first, subject, i); }, progress);
     }
   }
   lighting.finish();
@@ -252,8 +256,10 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     for (std::size_t i = 0; i < groups.size(); ++i) {
       one.lights = only_group(rig, groups[i]);
       one.scene = lit[i]->path();
-      const auto add = [&](const Film& rows, unsigned first, const Camera& camera, std::size_t) {
-        if (!sum) sum = std::make_unique<Film>(camera.width, camera.height, FilmExtras{});
+      const auto add = [&](const Film& rows, unsigned first, const Subject& subject, std::size_t) {
+        if (!sum) {
+          sum = std::make_unique<Film>(subject.camera.width, subject.camera.height, FilmExtras{});
+        }
         sum->add_group(group_channel(groups[i]), rows, first);
       };
       const Part part{.emission = groups[i].empty(), .held_bytes = sum_bytes, .moment = moment};
@@ -274,8 +280,9 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
   std::vector<PictureTarget> of_frame(targets.begin(), targets.end());
   std::optional<PictureFiles> files;
   std::optional<float> exposure, chosen = request.exposure;
-  const auto write = [&](const Film& rows, unsigned first, const Camera& camera,
+  const auto write = [&](const Film& rows, unsigned first, const Subject& subject,
                          std::size_t frame) {
+    const Camera& camera = subject.camera;
     if (first == 0) {
       if (request.sequence) of_frame = targets_of_frame(targets, request.sequence->frames[frame]);
       files.emplace(of_frame, camera.width, camera.height, layer_types(rows), chosen,
@@ -286,6 +293,24 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
     if (const auto found = files->publish()) exposure = chosen = found;
   };
   LightingReport report = render_part(request, targets, part, write, progress);
+  report.exposure = exposure;
+  return report;
+}
+
+/// Bakes the vertices of meshes.
+LightingReport render_vertices(const RenderRequest& request, std::span<const PictureTarget> targets,
+                               Progress& progress) {
+  std::optional<VertexFiles> files;
+  std::optional<float> exposure;
+  const auto write = [&](const Film& rows, unsigned first, const Subject& subject, std::size_t) {
+    if (first == 0) {
+      files.emplace(targets, subject.mesh, request.exposure,
+                    roomiest_temp_dir(request.run, targets.front().path));
+    }
+    files->write(rows);
+    if (first + rows.height() == subject.camera.height) exposure = files->publish();
+  };
+  LightingReport report = render_part(request, targets, {}, write, progress);
   report.exposure = exposure;
   return report;
 }
@@ -314,6 +339,7 @@ LightingReport render_container(const RenderRequest& request,
                                 const std::optional<Moment>& moment, Progress& progress) {
   if (request.light_groups) return render_groups(request, targets, moment, progress);
   if (request.texture) return render_tiles(request, targets, progress);
+  if (request.vertices) return render_vertices(request, targets, progress);
   return render_files(request, targets, {.moment = moment}, progress);
 }
 

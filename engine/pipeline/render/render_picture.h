@@ -69,6 +69,10 @@ struct RenderRequest : LightingRequest {
   /// then, `size` is 1024 x 1024 when it is empty, and `light_groups` is refused. Names of targets
   /// may hold kTileMark: they stand for a file for each tile of the texture coordinates.
   std::optional<TextureTarget> texture;
+  /// Bakes the vertices of the meshes in place of a picture: each is what the surface around it
+  /// looks like along its normal. Targets are .ply and .glb (VertexFiles); `size` is empty.
+  /// `texture`, a sequence and `light_groups` are refused.
+  bool vertices = false;
   /// Keeps the light of each group of lights apart, in a layer for each of an .exr. The scene is
   /// lit and rendered once for each; `error`, `estimate`, `glossy`, `shadows`, `check` and
   /// `tolerate_damage` keep their defaults then.
@@ -76,6 +80,9 @@ struct RenderRequest : LightingRequest {
   /// Stops by which a .png of light is brightened; empty: chosen so that the picture is well seen
   /// (spec/shading.md#display).
   std::optional<float> exposure;
+
+  /// Says whether a mesh is baked in place of a picture.
+  [[nodiscard]] bool bakes() const noexcept { return texture || vertices; }
 };
 
 /// Renders a picture and writes it to one or more files.
@@ -98,10 +105,10 @@ struct RenderRequest : LightingRequest {
 ///   light_NAME         3   only with `light_groups`: the beauty that is due to a group; the sum of
 ///                          all is the beauty
 ///
-/// An .exr gets all layers, a .png one of them. Each layer is the mean over the samples of a pixel,
-/// except that `alpha` of a texture leaves out its margin, and that the layers of estimates are
-/// root mean squares, which are upper bounds on the error of that mean. Each file is published
-/// whole or not at all.
+/// An .exr gets all layers, a .png one of them, and a .ply or .glb of vertices what VertexFiles
+/// says. Each layer is the mean over the samples of a pixel, except that `alpha` of a texture
+/// leaves out its margin, and that the layers of estimates are root mean squares, which are upper
+/// bounds on the error of that mean. Each file is published whole or not at all.
 /// @param targets   one or more files, all from one rendering
 /// @param progress  gets the stages, and notes about the meshes and the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was

@@ -12,6 +12,7 @@
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/built_scene.h"
+#include "engine/pipeline/render/vertex_view.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
 
@@ -60,10 +61,10 @@ void load_subject(Subject& subject, const RenderRequest& request,
     progress.note(
         "the meshes lie outside of the scene: is this the container that was built from them?");
   }
-  if (!request.texture) return;
+  if (!request.bakes()) return;
   require_request(!subject.mesh.triangles.empty(), "meshes",
-                  meshes.parts ? "the meshes do not fit in memory, as baking a texture asks for"
-                               : "there is no mesh whose texture is to be baked");
+                  meshes.parts ? "the meshes do not fit in memory, as baking asks for"
+                               : "there is no mesh that is to be baked");
 }
 
 void trace_subject(Subject& subject, const RenderRequest& request, const Lighting& lighting,
@@ -91,12 +92,12 @@ void see_texture(Subject& subject, const RenderRequest& request, const TextureTi
   const glm::uvec2 size(subject.camera.width, subject.camera.height);
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this texture");
   charge_mesh(budget, subject.mesh, subject.rays.get());
-  budget.charge("the mesh in its texture", TextureView::bytes_for(*subject.rays, size));
+  budget.charge("the mesh as it is baked", TextureView::bytes_for(*subject.rays, size));
   budget.require();
   auto view = std::make_unique<TextureView>(*subject.rays, *subject.light, subject.sampling, size,
                                             subject.side, subject.radius, subject.lift,
                                             *request.texture, tile, executor);
-  subject.texture_bytes = view->bytes();
+  subject.baked_bytes = view->bytes();
   if (view->covered() == 0) {
     progress.note(
         "no middle of a texel lies on a surface: the texture coordinates are outside of the "
@@ -109,6 +110,17 @@ void see_texture(Subject& subject, const RenderRequest& request, const TextureTi
         overlap));
   }
   subject.view = std::move(view);
+}
+
+void see_vertices(Subject& subject, const RenderRequest& request) {
+  MemoryBudget budget = budget_of(request.run.memory_bytes, "these vertices");
+  charge_mesh(budget, subject.mesh, subject.rays.get());
+  subject.baked_bytes = VertexView::bytes_for(subject.mesh);
+  budget.charge("the mesh as it is baked", subject.baked_bytes);
+  budget.require();
+  subject.view = std::make_unique<VertexView>(*subject.rays, *subject.light, subject.sampling,
+                                              subject.camera.width, subject.side, subject.radius,
+                                              subject.lift);
 }
 
 SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,

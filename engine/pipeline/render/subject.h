@@ -30,7 +30,7 @@ struct Subject {
   PictureShadows shadows;
   bool rays_at_emitters = false;  ///< those of the mesh light it by rays, and not by the gather
   std::unique_ptr<PrimaryView> view;
-  std::uint64_t texture_bytes = 0;  ///< of the view of a texture
+  std::uint64_t baked_bytes = 0;  ///< of the view of a texture or of vertices
 
   [[nodiscard]] bool has_mesh() const noexcept { return !mesh.triangles.empty(); }
   [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{camera.width} * camera.height; }
@@ -46,7 +46,7 @@ struct Subject {
 /// @param moment    when they are seen, if they move
 /// @param emission  whether they emit
 /// @param target    as for roomiest_temp_dir()
-/// @throws as load_meshes(); RequestError when a texture is asked for and no mesh is in memory
+/// @throws as load_meshes(); RequestError when a mesh is to be baked and none is in memory
 void load_subject(Subject& subject, const RenderRequest& request,
                   const std::optional<Moment>& moment, bool emission, const ContainerReader& scene,
                   const Sky& sky, const std::filesystem::path& target, Progress& progress);
@@ -60,6 +60,8 @@ void see_mesh(Subject& subject);
 /// @pre trace_subject()
 void see_texture(Subject& subject, const RenderRequest& request, const TextureTile& tile,
                  const Executor& executor, Progress& progress);
+/// Makes a view of the vertices of the subject's mesh. @pre trace_subject()
+void see_vertices(Subject& subject, const RenderRequest& request);
 
 /// The memory of a view of surfels.
 struct SurfelViewBytes {
