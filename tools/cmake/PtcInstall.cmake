@@ -57,7 +57,7 @@ add_custom_target(ptc_headers ALL DEPENDS ${PROJECT_BINARY_DIR}/include/stamp)
 ptc_add_library(ptc-store EXPORT store LAYERS ${PTC_STORE_LAYERS}
   LINK zstd::libzstd_shared PkgConfig::lz4 PkgConfig::xxhash Threads::Threads)
 ptc_add_library(ptc EXPORT ptc LAYERS ${PTC_LAYERS}
-  LINK TBB::tbb embree OpenEXR::OpenEXR pugixml::pugixml draco::draco PkgConfig::lz4 ZLIB::ZLIB JPEG::JPEG PNG::PNG fmt::fmt PkgConfig::hwy PkgConfig::uring PkgConfig::stb Threads::Threads)
+  LINK TBB::tbb embree OpenEXR::OpenEXR pugixml::pugixml draco::draco meshoptimizer::meshoptimizer PkgConfig::lz4 ZLIB::ZLIB JPEG::JPEG PNG::PNG fmt::fmt PkgConfig::hwy PkgConfig::uring PkgConfig::stb Threads::Threads)
 foreach(kind shared static)  # the headers of ptc::ptc include those of GLM
   target_link_libraries(ptc_${kind} PUBLIC ptc-store_${kind} INTERFACE glm::glm)
 endforeach()
@@ -79,6 +79,7 @@ install(FILES ${PROJECT_BINARY_DIR}/ptcConfig.cmake ${PROJECT_BINARY_DIR}/ptcCon
   DESTINATION ${package} COMPONENT libptc-dev)
 # The names of libraries, not of their pkg-config packages: a program that links the shared library needs none of these.
 pkg_check_modules(private REQUIRED QUIET OpenEXR draco fmt libhwy libpng liburing libjpeg pugixml stb zlib tbb)
+list(APPEND private_LIBRARIES meshoptimizer)  # has no pkg-config package
 list(TRANSFORM private_LIBRARIES PREPEND -l)
 list(JOIN private_LIBRARIES " " PTC_PRIVATE_LIBS)
 file(RELATIVE_PATH PTC_PREFIX_FROM_PC /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)
@@ -149,7 +150,7 @@ foreach(component IN LISTS CPACK_COMPONENTS_ALL)
 endforeach()
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_DEPENDS "libptc (= ${PROJECT_VERSION}), libglm-dev")
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_SUGGESTS
-  "libzstd-dev, liblz4-dev, libxxhash-dev, libopenexr-dev, libtbb-dev, libembree-dev, libfmt-dev, libhwy-dev, liburing-dev, libpugixml-dev, libdraco-dev, libjpeg-dev, libpng-dev, zlib1g-dev")
+  "libzstd-dev, liblz4-dev, libxxhash-dev, libopenexr-dev, libtbb-dev, libembree-dev, libfmt-dev, libhwy-dev, liburing-dev, libpugixml-dev, libdraco-dev, libmeshoptimizer-dev, libjpeg-dev, libpng-dev, zlib1g-dev")
 set(CPACK_DEBIAN_LIBPTC_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/tools/install/triggers)
 set(CPACK_PACKAGE_NAME ptcx)
 set(CPACK_PACKAGE_CONTACT "The PTCX authors <ptcx@users.noreply.github.com>")

@@ -128,6 +128,14 @@ double load(const std::byte* from, std::uint64_t type) {
                    std::to_string((bytes >> 20) + 1) + " MiB or more");
 }
 
+// Refuses a document whose decompressed buffer views take more memory than there is.
+[[noreturn]] void refuse_views(const std::filesystem::path& path, std::uint64_t bytes) {
+  throw LimitError(path.string() +
+                   ": its bufferViews that meshoptimizer compressed do not fit in "
+                   "`run.memory_bytes`: they take " +
+                   std::to_string((bytes >> 20) + 1) + " MiB or more");
+}
+
 // Measures the memory that parsed JSON takes, without keeping it.
 class JsonMeter : public nlohmann::json_sax<nlohmann::json> {
  public:
@@ -189,7 +197,7 @@ std::size_t components_of(const std::string& type) {
 }  // namespace
 
 GltfDocument::GltfDocument(const std::filesystem::path& path, std::uint64_t memory_bytes)
-    : path_(path), file_(path) {
+    : path_(path), file_(path), view_room_(memory_bytes) {
   bytes_read_ = file_.size();
   std::array<std::byte, 4> magic{};
   if (file_.size() >= 12) file_.read_at(0, magic);
@@ -199,6 +207,7 @@ GltfDocument::GltfDocument(const std::filesystem::path& path, std::uint64_t memo
     parse(read_text(0, file_.size(), memory_bytes), memory_bytes);
   }
   buffers_.resize(count("buffers"));
+  view_room_ -= std::min(view_room_, json_bytes_);
 }
 
 void GltfDocument::fail(const std::string& rule) const {
@@ -376,21 +385,76 @@ const GltfDocument::Buffer& GltfDocument::buffer(std::uint64_t index) {
 }
 
 GltfDocument::View GltfDocument::find_view(std::uint64_t index) {
-  const Json& description = at("bufferViews", index);
+  const auto known = decompressed_.find(index);
+  if (known != decompressed_.end()) return known->second;
+  if (const auto stream = find_stream(index)) return decompress(index, *stream);
+  return checked_view(at("bufferViews", index), "bufferView " + std::to_string(index));
+}
+
+GltfDocument::View GltfDocument::checked_view(const Json& description, const std::string& name) {
   const auto owner = unsigned_at(description, "buffer");
   if (!owner) fail("a bufferView has no buffer");
   const std::uint64_t bytes = buffer(*owner).length;
   const View view{*owner, unsigned_at(description, "byteOffset").value_or(0),
                   unsigned_at(description, "byteLength").value_or(0)};
   if (view.offset > bytes || view.length > bytes - view.offset) {
-    fail("bufferView " + std::to_string(index) + " reaches past its buffer");
+    fail(name + " reaches past its buffer");
   }
   return view;
 }
 
+std::optional<GltfDocument::Stream> GltfDocument::find_stream(std::uint64_t index) {
+  const Json& description = at("bufferViews", index);
+  const Json* const json = extension(description, "EXT_meshopt_compression");
+  if (json == nullptr) return std::nullopt;
+  const std::string name = "bufferView " + std::to_string(index);
+  Stream stream{.view = checked_view(*json, name), .how = {}};
+  stream.how.count = unsigned_at(*json, "count").value_or(0);
+  stream.how.stride = unsigned_at(*json, "byteStride").value_or(0);
+  if (const char* const rule = read_meshopt_view(*json, stream.how))
+    fail(name + ": meshopt: " + rule);
+  if (!stream.how.may_come_of(stream.view.length))
+    fail(name + ": meshopt: it has more elements than bytes for them");
+  if (unsigned_at(description, "byteLength").value_or(0) != stream.how.bytes() ||
+      unsigned_at(description, "byteStride").value_or(stream.how.stride) != stream.how.stride) {
+    fail(name + ": meshopt: its elements do not fill it");
+  }
+  return stream;
+}
+
+GltfDocument::View GltfDocument::decompress(std::uint64_t index, const Stream& stream) {
+  const std::uint64_t needed = stream.how.bytes() + stream.view.length;
+  if (needed > view_room_ - views_taken_) refuse_views(path_, views_taken_ + needed);
+  std::vector<std::byte> bytes(stream.view.length);
+  buffers_[stream.view.buffer]->part(stream.view.offset, bytes.size()).read(0, bytes);
+  Buffer made;
+  made.held = decode_meshopt(bytes, stream.how);
+  if (made.held.size() != stream.how.bytes())
+    fail("bufferView " + std::to_string(index) + ": meshopt: the stream is damaged");
+  made.length = made.held.size();
+  views_taken_ += made.length;
+  const View view{buffers_.size(), 0, made.length};
+  buffers_.emplace_back(std::move(made));
+  return decompressed_.emplace(index, view).first->second;
+}
+
+std::uint64_t GltfDocument::view_bytes() {
+  std::uint64_t bytes = 0, greatest = 0;
+  for (std::uint64_t i = 0; i < count("bufferViews"); ++i) {
+    const auto stream = find_stream(i);
+    if (!stream) continue;
+    const std::uint64_t more = stream->how.bytes();
+    if (!decompressed_.contains(i)) greatest = std::max(greatest, stream->view.length);
+    if (more > view_room_ || bytes + greatest > view_room_ - more)
+      refuse_views(path_, bytes + greatest + more);
+    bytes += more;
+  }
+  return bytes + greatest;
+}
+
 ByteRange GltfDocument::view(std::uint64_t index) {
   const View view = find_view(index);
-  return buffer(view.buffer).part(view.offset, view.length);
+  return buffers_[view.buffer]->part(view.offset, view.length);
 }
 
 GltfDocument::Elements GltfDocument::find_shape(std::uint64_t index, std::size_t components,

@@ -22,17 +22,19 @@
 
 #include "engine/io/file/file.h"
 #include "engine/io/image/byte_range.h"
+#include "engine/io/mesh/gltf_meshopt.h"
 
 namespace ptc {
 
-/// A .gltf file with its buffers, or a .glb file. What is in memory is the JSON and buffers in data
-/// URIs; other buffers are read from their files piece by piece.
+/// A .gltf file with its buffers, or a .glb file. What is in memory is the JSON, buffers in data
+/// URIs, and buffer views that meshoptimizer compressed (EXT_meshopt_compression), once they were
+/// used; other buffers are read from their files piece by piece.
 class GltfDocument {
  public:
   using Json = nlohmann::json;
 
   /// Reads and parses the JSON, but no other file.
-  /// @param memory_bytes  cap on the memory of the JSON
+  /// @param memory_bytes  cap on the memory of the JSON and of decompressed buffer views
   /// @throws DataError when the file is neither a JSON object nor a GLB of version 2, or the JSON
   /// is
   ///         nested too deep; LimitError when it takes more memory; std::system_error
@@ -101,6 +103,9 @@ class GltfDocument {
             const std::function<void(std::span<const double>)>& take) const;
   /// Returns the memory of the JSON, bytes.
   [[nodiscard]] std::uint64_t json_bytes() const noexcept { return json_bytes_; }
+  /// Returns the memory that all compressed buffer views will take, bytes.
+  /// @throws DataError when one breaks a rule; LimitError when there is less memory
+  [[nodiscard]] std::uint64_t view_bytes();
   /// Returns the size of the file and of the buffers that were used so far, bytes.
   [[nodiscard]] std::uint64_t bytes_read() const noexcept { return bytes_read_; }
 
@@ -127,13 +132,27 @@ class GltfDocument {
   /// Returns a buffer with as many bytes as it declares.
   const Buffer& buffer(std::uint64_t index);
   [[nodiscard]] View find_view(std::uint64_t index);
+  /// A stream of meshoptimizer.
+  struct Stream {
+    View view;  ///< of its bytes
+    MeshoptView how;
+  };
+  /// Returns the stream of a buffer view that is compressed, or nothing.
+  [[nodiscard]] std::optional<Stream> find_stream(std::uint64_t index);
+  /// Returns a view of decompressed bytes.
+  [[nodiscard]] View decompress(std::uint64_t index, const Stream& stream);
+  [[nodiscard]] View checked_view(const Json& description, const std::string& name);
   [[nodiscard]] InputFile open_part(const std::filesystem::path& name) const;
 
   std::filesystem::path path_;
   InputFile file_;
   Json root_;
   Buffer binary_chunk_;
-  std::vector<std::optional<Buffer>> buffers_;  // found when first needed
+  // Of the file, found when first needed; then those of decompressed views
+  std::vector<std::optional<Buffer>> buffers_;
+  std::map<std::uint64_t, View> decompressed_;  // by index of the view
+  std::uint64_t view_room_;                     // memory for these, bytes
+  std::uint64_t views_taken_ = 0;               // of it
   std::map<std::string, InputFile> files_;      // of buffers, by name
   std::uint64_t bytes_read_ = 0;
   std::uint64_t json_bytes_ = 0;

@@ -8,11 +8,11 @@
 //                          `--> material --> texture --> image
 //
 // GltfDocument follows the arrows and checks each index. GltfPrimitive reads the numbers of a
-// primitive, compressed or not. walk_gltf_nodes() walks the nodes of the
-// default scene and notes where meshes stand. GltfMesh appends every primitive to one MeshSoup, in
-// which all vertices have normals and texture coordinates of the same index: a mesh that stands in
-// two places is there twice. Where that would not fit in memory, such a mesh gets a soup of its
-// own, once, and keeps its places.
+// primitive, compressed or not. walk_gltf_nodes() walks the nodes of the default scene and notes
+// where meshes stand. GltfMesh appends every primitive to one MeshSoup, in which all vertices have
+// normals and texture coordinates of the same index: a mesh that stands in two places is there
+// twice. Where that would not fit in memory, such a mesh gets a soup of its own, once, and keeps
+// its places.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,7 +43,8 @@ struct Extension {
   bool understood;  // or else it can be left out with little harm, which is told
 };
 // Pictures in WebP have warnings of their own.
-constexpr std::array<Extension, 16> kExtensions = {{{"EXT_mesh_gpu_instancing", true},
+constexpr std::array<Extension, 17> kExtensions = {{{"EXT_mesh_gpu_instancing", true},
+                                                    {"EXT_meshopt_compression", true},
                                                     {"KHR_draco_mesh_compression", true},
                                                     {"KHR_materials_emissive_strength", true},
                                                     {"KHR_materials_pbrSpecularGlossiness", true},
@@ -79,6 +80,7 @@ class GltfMesh {
 
   MeshFile read() {
     check_extensions();
+    room_.memory_bytes -= std::min(room_.memory_bytes, document_.view_bytes());
     GltfNodes nodes =
         walk_gltf_nodes(document_, GltfSearch::all, room_.seconds, room_.memory_bytes, warnings_);
     uses_ = std::move(nodes.uses);
