@@ -61,9 +61,10 @@ void declare(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   arguments.scene.declare(command,
                           "Container, clouds or meshes whose surfels give the indirect light");
-  command.add_outputs("-o,--output", arguments.outputs, {".exr", ".png", ".ply", ".glb"},
-                      "Texture or mesh to write; repeatable\n"
-                      "write; repeatable");
+  command.add_outputs(
+      "-o,--output", arguments.outputs, {".exr", ".png", ".ply", ".glb"},
+      "Texture or mesh to write; repeatable\n"
+      "A texture is an .exr with all layers or a .png, a mesh a .ply with all or a .glb.");
   ptc::add_layers(app, arguments.layers, kLayers, {".png", ".glb", ".ply"});
   command.add_inputs("--mesh", request.meshes, ptc::mesh_endings(),
                      "Mesh that is baked; repeatable\n"
