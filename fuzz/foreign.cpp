@@ -69,6 +69,11 @@ void check(const Mesh& mesh) {
   }
 }
 
+void check(const MeshCamera& camera) {
+  require(is_finite(camera.position) && is_unit(camera.forward) && is_unit(camera.up));
+  require(camera.horizontal_fov > 0 && camera.horizontal_fov < 3.1416F);
+}
+
 void read_mesh_file(const Path& path) {
   const MeshFile file = read_mesh(path);
   if (file.placed.empty() || !file.mesh.triangles.empty()) check(file.mesh);
@@ -82,10 +87,9 @@ void read_mesh_file(const Path& path) {
     require(light.inner_angle >= 0 && light.inner_angle <= light.outer_angle &&
             light.outer_angle > 0 && light.outer_angle < 1.5708F);
   }
-  for (const MeshCamera& camera : file.cameras) {
-    require(is_finite(camera.position) && is_unit(camera.forward) && is_unit(camera.up));
-    require(camera.horizontal_fov > 0 && camera.horizontal_fov < 3.1416F);
-  }
+  for (const MeshCamera& camera : file.cameras) check(camera);
+  const std::uint64_t memory = std::uint64_t{1} << 30;
+  for (const MeshCamera& camera : read_cameras(path, 0.5, memory).cameras) check(camera);
 }
 
 void read_cloud(const Path& path) {
