@@ -124,6 +124,8 @@ int main(int argc, char** argv) {
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     ptc::apply_preset(command.app(), preset, arguments.request);
+    if (bakes_vertices(arguments))
+      ptc::note_unused(command.app(), {"--margin"}, "no texture is baked", progress);
     return bake(arguments, command.run_options(), progress);
   });
 }

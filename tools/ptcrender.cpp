@@ -93,8 +93,7 @@ void declare_picture(ptc::Command& command, Arguments& arguments) {
       .add_inputs("--camera-file", arguments.request.camera_files, ptc::mesh_endings(),
                   "Mesh or scene file whose cameras may be taken; repeatable")
       ->group(kGroup);
-  app.add_option("--camera-name", arguments.request.camera_name,
-                 "Name of the camera of the mesh and scene files that is taken")
+  app.add_option("--camera-name", arguments.request.camera_name, "Take the camera with this name")
       ->type_name("NAME")
       ->group(kGroup);
   ptc::add_samples(app, arguments.request.samples)->group(kGroup);
@@ -154,6 +153,10 @@ int main(int argc, char** argv) {
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     ptc::apply_preset(command.app(), preset, arguments.request);
+    if (!arguments.sequence.sequence())
+      ptc::note_unused(command.app(), {"--fps"}, "one picture is rendered", progress);
+    if (arguments.camera.camera())
+      ptc::note_unused(command.app(), {"--camera-file"}, "--camera is given", progress);
     return render(arguments, command.run_options(), progress);
   });
 }

@@ -17,7 +17,6 @@
 #include <fmt/format.h>
 
 #include "engine/base/progress_text.h"
-#include "engine/io/text/text.h"
 #include "format/text.h"
 #include "tools/option_text.h"
 
@@ -325,11 +324,7 @@ Outcome render_files(const RenderRequest& request,
                      const std::vector<std::filesystem::path>& outputs,
                      const std::vector<PictureTarget>& layers, Progress& progress) {
   std::vector<PictureTarget> targets = layers;
-  for (const auto& output : outputs) {
-    // A renderer multiplies the colours of a .glb by those of its materials
-    const bool is_glb = lower_extension(output) == ".glb";
-    targets.push_back({.path = output, .layer = is_glb ? "irradiance" : "beauty"});
-  }
+  for (const auto& output : outputs) targets.push_back({.path = output});
   const LightingReport report = render_picture(request, targets, progress);
   std::vector<std::string> names;
   for (const PictureTarget& target : targets) names.push_back(target.path.string());

@@ -1,4 +1,4 @@
-// Textures that are baked: where texels lie, what they hold, and what is refused.
+// Textures and vertices that are baked: where texels lie, what they hold, and what is refused.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -14,6 +14,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/image/srgb.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/render/render_picture.h"
@@ -358,6 +359,7 @@ TEST_CASE("bake: vertices have the light of the surface around them, in a .ply a
   CHECK(report.receivers == 4 * mesh.positions.size());
 
   // The PLY has positions in double, all values, and what they are
+  REQUIRE(report.exposure);
   const BakedPly ply = read_ply(bake.path("a.ply"));
   REQUIRE(ply.vertices == mesh.positions.size());
   const auto value = [&](const char* name, std::size_t i) { return ply.values.at(name)[i]; };
@@ -383,14 +385,14 @@ TEST_CASE("bake: vertices have the light of the surface around them, in a .ply a
     else
       CHECK(value("radiance_g", i) ==
             Approx(0.25 * value("irradiance_g", i) / std::numbers::pi).margin(1e-4));
-    CHECK(value("red", i) <= 255);
+    const double shown = std::exp2(static_cast<double>(*report.exposure)) * value("radiance_r", i);
+    CHECK(value("red", i) == Approx(255 * linear_to_srgb(std::min(1.0, shown))).margin(0.51));
   }
   const std::size_t far_corner = first - 1;
   CHECK(value("irradiance_g", far_corner) == Approx(std::numbers::pi).epsilon(0.03));
   CHECK(read_mesh(bake.path("a.ply")).mesh.triangles.size() == mesh.triangles.size());
 
   // The GLB has the same light as COLOR_0; reading numbers the vertices as triangles use them
-  REQUIRE(report.exposure);
   const Mesh lit = read_mesh(bake.path("a.glb")).mesh,
              occluded = read_mesh(bake.path("occlusion.glb")).mesh;
   std::vector<std::uint32_t> number(mesh.positions.size());
@@ -425,6 +427,45 @@ TEST_CASE("bake: vertices have the light of the surface around them, in a .ply a
   }
   CHECK(most <= 1);
   CHECK(most > 0.8);
+}
+
+TEST_CASE("bake: colours that vertices had are part of the light of a .glb, but not of others",
+          "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {0, 0}, {1, 1});
+  Bake bake(mesh);
+  bake.request.texture.reset();
+  bake.request.size.reset();
+  bake.request.vertices = true;
+  bake.request.exposure = 0;
+  render_picture(
+      bake.request,
+      std::vector<PictureTarget>{{bake.path("a.glb")}, {bake.path("o.glb"), "occlusion"}},
+      bake.notes);
+  const Mesh lit = read_mesh(bake.path("a.glb")).mesh,
+             occluded = read_mesh(bake.path("o.glb")).mesh;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::vec3& p = lit.positions[i];
+    CHECK(lit.colours[i].r == Approx((p.x + 1) / 2).margin(0.03));
+    CHECK(lit.colours[i].g == 0);
+    CHECK(lit.colours[i].b == Approx((p.z + 1) / 2).margin(0.03));
+    CHECK(occluded.colours[i].g > 0.98F);
+  }
+}
+
+TEST_CASE("bake: a mesh that a scene file names is not overwritten", "[integration][bake]") {
+  Mesh mesh;
+  add_square(mesh, 0, {0, 0}, {1, 1});
+  Bake bake(mesh);
+  std::ofstream(bake.path("floor.ply")) << "ply\n";
+  std::ofstream(bake.path("a.scene.json"))
+      << R"({"ptcx_scene": 1, "objects": [{"file": "floor.ply"}]})";
+  bake.request.texture.reset();
+  bake.request.size.reset();
+  bake.request.vertices = true;
+  bake.request.mesh = nullptr;
+  bake.request.scene = bake.path("a.scene.json");
+  CHECK_THROWS_WITH(bake.run("floor.ply"), Catch::Contains("is read by this run"));
 }
 
 TEST_CASE("bake: what baking vertices cannot do is refused", "[integration][bake]") {

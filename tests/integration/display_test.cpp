@@ -104,14 +104,14 @@ TEST_CASE("display: a .png is not flat white unless that is asked for", "[integr
   const Film film = bright_film();
   std::vector<ExrLayerType> types;
   for (const Film::Layer& layer : film.layers()) types.push_back(layer.type);
-  const auto write = [&](std::optional<float> exposure) {
-    PictureFiles files(targets, 100, 100, types, exposure, scratch.path());
+  const auto write = [&](std::optional<Display> display) {
+    PictureFiles files(targets, 100, 100, types, display, scratch.path());
     files.write(film);
-    const std::optional<float> chosen = files.publish();
-    CHECK(chosen.has_value() == !exposure.has_value());
+    const std::optional<Display> chosen = files.publish();
+    CHECK(chosen.has_value() == !display.has_value());
     return read_image(scratch.path() / "a.png");
   };
-  CHECK(share_of_white(write(0.0f)) == Approx(0.9));
+  CHECK(share_of_white(write(Display::at_exposure(0))) == Approx(0.9));
   const Image chosen = write({});
   CHECK(share_of_white(chosen) <= 0.01);
   CHECK(chosen.at(50, 99).x > 0.8f);

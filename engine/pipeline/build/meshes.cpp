@@ -320,6 +320,15 @@ bool moves(const SceneObjects& scene, std::uint64_t memory_bytes) {
          });
 }
 
+bool cameras_may_move(const SceneObjects& scene, std::uint64_t memory_bytes) {
+  const auto has_keys = [](const SceneCamera& camera) { return camera.keys.size() > 1; };
+  return scene.moves || std::ranges::any_of(scene.cameras, has_keys) ||
+         std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
+           return !holds_points(object.file) &&
+                  read_cameras(object.file, {}, memory_bytes).animation_seconds > 0;
+         });
+}
+
 Bounds bounds_before_backdrop(const Mesh& mesh) {
   Bounds bounds;
   for (std::size_t i = 0; i + kBackdropTriangles < mesh.triangles.size(); ++i) {

@@ -75,6 +75,8 @@ struct LoadedMeshes {
 /// Says whether an object of a scene moves, by its keys or by an animation of its file.
 /// @throws as file_cameras()
 [[nodiscard]] bool moves(const SceneObjects& scene, std::uint64_t memory_bytes);
+/// Says whether cameras of a scene may move. @throws as file_cameras()
+[[nodiscard]] bool cameras_may_move(const SceneObjects& scene, std::uint64_t memory_bytes);
 
 /// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
 /// @pre the mesh is in memory

@@ -397,8 +397,12 @@ class SceneReader {
     PlaceParts parts = from;
     parts.translate = glm::mix(from.translate, to.translate, share);
     parts.scale = glm::mix(from.scale, to.scale, share);
-    if (from.axis == to.axis) {
-      parts.angle = glm::mix(from.angle, to.angle, share);
+    // What is not turned has any axis, and a turn around one is one back around its opposite
+    const glm::dvec3 axis = from.angle == 0 ? to.axis : from.axis;
+    const double sign = to.axis == -axis ? -1 : 1;
+    if (to.angle == 0 || to.axis == sign * axis) {
+      parts.axis = axis;
+      parts.angle = glm::mix(from.angle, sign * to.angle, share);
     } else {
       const glm::dquat turn = glm::slerp(glm::angleAxis(from.angle, from.axis),
                                          glm::angleAxis(to.angle, to.axis), share);

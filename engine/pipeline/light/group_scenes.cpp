@@ -52,6 +52,7 @@ void add_costs(LightingReport& report, const LightingReport& group) {
   report.bounces = group.bounces;
   report.shade_cpu_seconds += group.shade_cpu_seconds;
   report.bounce_cpu_seconds += group.bounce_cpu_seconds;
+  report.glossy_cpu_seconds += group.glossy_cpu_seconds;
   report.gather.add(group.gather);
   report.cache = group.cache;
   for (const auto& [stage, seconds] : group.seconds) {
@@ -73,6 +74,8 @@ void add_run(LightingReport& report, const LightingReport& run) {
   if (run.exposure) report.exposure = run.exposure;
   // Tell of the one that is farthest from what was asked
   if (run.tuning && (!report.tuning || report.tuning->met)) report.tuning = run.tuning;
+  if (run.mirrors) report.mirrors = run.mirrors;
+  if (run.estimate) report.estimate = run.estimate;
   if (run.damage && (!report.damage || report.damage->pages.empty())) report.damage = run.damage;
   if (!run.check || run.check->receivers == 0) return;
   if (!report.check) {

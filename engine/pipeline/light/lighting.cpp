@@ -1,5 +1,6 @@
 // Every phase that reads the scene may use all the memory that prepare() found for the page cache,
-// because no two of them run at once:
+// because no two of them run at once. Views of a sequence after the first are made beside the
+// gather, with pages that the caller charged:
 //
 //   prepare()   bounces before the last   a cache for each, one after another
 //   (caller)    the view of a picture     a cache

@@ -1,6 +1,8 @@
 // One run of the gather, or of rays in its place: what shading points and rendering a picture have
 // in common.
 //
+// Between two pictures of a sequence comes begin_picture().
+//
 //   Lighting()  ->  prepare()        ->  tune()       ->  shade() ...  ->  finish()  ->  check()
 //   open the        divide memory,       settings by      block by         complete      rays at
 //   scene           earlier bounces      pilots           block            the report    a sample

@@ -40,7 +40,6 @@ std::size_t index_of(const std::vector<MeshCamera>& cameras, const std::string& 
 /// Returns the camera that does not come from a file.
 Camera fixed_camera(const RenderRequest& request, const ContainerReader& scene,
                     const Subject& subject) {
-  if (request.camera) return *request.camera;
   if (request.bakes()) {
     constexpr unsigned kSide = 1024;
     const Bounds box = subject.mesh.bounds();
@@ -53,6 +52,7 @@ Camera fixed_camera(const RenderRequest& request, const ContainerReader& scene,
     }
     return camera;
   }
+  if (request.camera) return *request.camera;
   std::optional<Bounds> box;
   if (request.backdrop && subject.has_mesh()) box = bounds_before_backdrop(subject.mesh);
   return default_camera(scene, {}, box, request.size);
@@ -77,43 +77,67 @@ glm::dvec3 middle_of(const RenderRequest& request, const ContainerReader& scene,
 
 }  // namespace
 
+Continuity continuity_of(const RenderRequest& request) {
+  Continuity kept;
+  if (request.exposure) kept.display = Display::at_exposure(*request.exposure);
+  return kept;
+}
+
 std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& request,
                                                         const ContainerReader& scene) {
   if (request.camera || request.bakes()) return {};
   const bool is_named = !request.camera_name.empty();
-  if (!is_named && request.camera_files.empty() && scene.meta().text.contains(kCameraKey))
-    return {};
-  std::vector<std::filesystem::path> files = request.camera_files;
-  files.insert(files.end(), request.meshes.begin(), request.meshes.end());
   const std::uint64_t memory = request.run.memory_bytes;
-  const auto cameras_at = [&](const std::optional<Moment>& moment) {
+  const auto cameras_at = [&](const std::vector<std::filesystem::path>& files,
+                              const std::optional<Moment>& moment) {
     return file_cameras(read_scene_objects(files, nullptr, memory, moment), moment, memory);
   };
-  const std::vector<MeshCamera> still = cameras_at({});
+  // Find the camera among those of the files, and then of the meshes
+  const bool is_recorded = scene.meta().text.contains(kCameraKey);
+  std::vector<std::filesystem::path> files = request.camera_files;
+  std::vector<MeshCamera> still = cameras_at(files, {});
+  if (is_named || (still.empty() && !is_recorded)) {
+    files.insert(files.end(), request.meshes.begin(), request.meshes.end());
+    still = cameras_at(files, {});
+  }
   if (still.empty() && !is_named) return {};
   const std::size_t index = is_named ? index_of(still, request.camera_name) : 0;
   if (!request.sequence) return std::vector{still[index]};
+
+  // Follow it
+  const FrameRange& frames = request.sequence->frames;
+  if (!cameras_may_move(read_scene_objects(files, nullptr, memory), memory))
+    return std::vector(frames.count(), still[index]);
   std::vector<MeshCamera> cameras;
-  for (std::size_t i = 0; i < request.sequence->frames.count(); ++i)
-    cameras.push_back(cameras_at(moment_of(*request.sequence, i))[index]);
+  for (std::size_t i = 0; i < frames.count(); ++i) {
+    const std::vector<MeshCamera> now = cameras_at(files, moment_of(*request.sequence, i));
+    if (now.size() != still.size()) {
+      throw DataError(
+          fmt::format("{}: a camera is missing at frame {}, because its node has a "
+                      "scale of 0 there",
+                      files.front().string(), frames[i]));
+    }
+    cameras.push_back(now[index]);
+  }
   return cameras;
 }
 
 std::vector<Camera> cameras_of_frames(const RenderRequest& request, const ContainerReader& scene,
                                       const std::optional<std::vector<MeshCamera>>& of_files,
-                                      const Subject& subject) {
+                                      const Subject& subject, Continuity& kept) {
   std::vector<Camera> cameras;
   if (of_files) {
     for (const MeshCamera& camera : *of_files) cameras.push_back(camera_of(camera, request.size));
   } else {
-    cameras.assign(request.sequence ? request.sequence->frames.count() : 1,
-                   fixed_camera(request, scene, subject));
+    if (!kept.camera) kept.camera = fixed_camera(request, scene, subject);
+    cameras.assign(request.sequence ? request.sequence->frames.count() : 1, *kept.camera);
   }
   if (request.sequence && request.sequence->turntable > 0) {
     const glm::dvec3 up(up_of(scene.meta().text));
-    const glm::dvec3 middle = of_files ? middle_of(request, scene, subject) : cameras[0].look_at;
+    if (!kept.middle)
+      kept.middle = of_files ? middle_of(request, scene, subject) : cameras[0].look_at;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
-      cameras[i] = turned_around(cameras[i], middle, up,
+      cameras[i] = turned_around(cameras[i], *kept.middle, up,
                                  turntable_angle(*request.sequence, request.sequence->frames[i]));
     }
   }

@@ -3,23 +3,26 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/io/text/text.h"
+#include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/light/built_scene.h"
 
 namespace ptc {
 namespace {
 
-/// @throws RequestError when there is no target, when the ending of one is neither .exr nor .png,
+/// @throws RequestError when there is no target, when one has an ending that the run does not
+/// write,
 ///         when a layer is unknown or not asked for, or when estimates, shadows or groups have no
-///         .exr to go to
+///         file of all layers to go to
 void check_targets(const RenderRequest& request, std::span<const PictureTarget> targets) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
-  bool exr = false;
+  bool has_all = false;
   for (const PictureTarget& target : targets) {
     const std::string ending = lower_extension(target.path);
     if (request.vertices && ending != ".ply" && ending != ".glb") {
@@ -31,7 +34,7 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
                                         target.path.string());
     }
     if (std::ranges::find(kPictureLayers, target.layer) == kPictureLayers.end()) {
-      throw RequestError("targets", "a picture has no layer '" + target.layer + "' for a .png");
+      throw RequestError("targets", "there is no layer '" + target.layer + "' to show");
     }
     if (target.layer == "reflection" && ending == ".png" && !request.glossy.roughness) {
       throw RequestError(
@@ -39,23 +42,35 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
           "the layer 'reflection' needs a roughness: ask for `glossy.roughness` as well");
     }
     if (target.layer == "irradiance" && !request.bakes()) {
-      throw RequestError("targets", "a picture has no layer 'irradiance': only a texture has it");
+      throw RequestError("targets",
+                         "a picture has no layer 'irradiance': only what is baked has it");
     }
-    exr |= ending == ".exr" || ending == ".ply";
+    has_all |= ending == ".exr" || ending == ".ply";
   }
-  if (!request.shadows.empty() && !exr) {
-    throw RequestError("shadows",
-                       "`shadows` adds layers, which only an .exr has: name an .exr as output");
-  }
-  if (request.light_groups && !exr) {
-    throw RequestError("light_groups",
-                       "`light_groups` adds layers, which only an .exr has: name "
-                       "an .exr as output");
-  }
-  if (request.estimate && !exr) {
-    throw RequestError("estimate",
-                       "`estimate` adds layers, which only an .exr has: name an .exr as output");
-  }
+  const auto needs_all = [&](bool asked, const char* field) {
+    if (!asked || has_all) return;
+    const char* const all = request.vertices ? "a .ply" : "an .exr";
+    throw RequestError(field, fmt::format("`{}` adds layers, which only {} has: name {} as output",
+                                          field, all, all));
+  };
+  needs_all(!request.shadows.empty(), "shadows");
+  needs_all(request.light_groups, "light_groups");
+  needs_all(request.estimate, "estimate");
+}
+
+/// Returns the files that a run reads, also those that scene files name.
+std::vector<std::filesystem::path> files_read(const RenderRequest& request) {
+  std::vector<std::filesystem::path> files = scene_files(request);
+  for (const auto& more : {request.meshes, request.camera_files})
+    files.insert(files.end(), more.begin(), more.end());
+  const std::vector<std::filesystem::path> named =
+      read_scene_objects(files, nullptr, request.run.memory_bytes).named;
+  files.insert(files.end(), named.begin(), named.end());
+  return files;
+}
+
+std::filesystem::path whole_name(const std::filesystem::path& path) {
+  return std::filesystem::absolute(path).lexically_normal();
 }
 
 }  // namespace
@@ -72,18 +87,33 @@ unsigned side_of(unsigned samples) {
 
 void check_names(const RenderRequest& request, std::span<const PictureTarget> targets,
                  const std::string& sky_picture) {
-  std::vector<std::filesystem::path> taken = scene_files(request);
-  taken.insert(taken.end(), request.meshes.begin(), request.meshes.end());
+  std::vector<std::filesystem::path> taken = files_read(request);
   if (!sky_picture.empty()) taken.emplace_back(sky_picture);
   const std::size_t read = taken.size();
+  const auto refuse = [](const std::filesystem::path& path, bool is_read) {
+    throw RequestError("targets",
+                       path.string() + (is_read ? " is read by this run: choose another name"
+                                                : " is the name of two pictures"));
+  };
   for (const PictureTarget& target : targets) {
     for (std::size_t i = 0; i < taken.size(); ++i) {
-      if (!same_name(target.path, taken[i])) continue;
-      throw RequestError(
-          "targets", target.path.string() + (i < read ? " is read by this run: choose another name"
-                                                      : " is the name of two pictures"));
+      if (same_name(target.path, taken[i])) refuse(target.path, i < read);
     }
     taken.push_back(target.path);
+  }
+  if (!request.sequence) return;
+
+  // The numbers of frames may make two names one
+  std::set<std::filesystem::path> names;
+  for (std::size_t i = 0; i < read; ++i) names.insert(whole_name(taken[i]));
+  const FrameRange& frames = request.sequence->frames;
+  for (std::size_t i = 0; i < frames.count(); ++i) {
+    std::set<std::filesystem::path> of_frame;
+    for (const PictureTarget& target : targets_of_frame(targets, frames[i])) {
+      const std::filesystem::path name = whole_name(target.path);
+      if (names.contains(name)) refuse(target.path, true);
+      if (!of_frame.insert(name).second) refuse(target.path, false);
+    }
   }
 }
 
@@ -99,6 +129,8 @@ void check_request(const RenderRequest& request, std::span<const PictureTarget> 
                     "`check` compares reflections of one picture: leave out the frames");
     static_cast<void>(targets_of_frame(targets, request.sequence->frames.first));
   }
+  require_request(!request.bakes() || (!request.camera && request.camera_name.empty()), "camera",
+                  "`camera` is for pictures: what is baked has none");
   require_request(!request.camera || request.camera_name.empty(), "camera_name",
                   "`camera_name` and a camera exclude each other");
   require_request(!request.bakes() || !request.light_groups, "light_groups",

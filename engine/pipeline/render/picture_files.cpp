@@ -20,19 +20,23 @@ bool is_exr(const PictureTarget& target) {
   return lower_extension(target.path) == ".exr";
 }
 
-/// Says whether a target shows light, whose exposure matters.
-bool is_light(const PictureTarget& target) {
-  return !is_exr(target) && target.layer != "occlusion" && target.layer != "albedo";
+/// Says whether a target shows light.
+bool shows_light(const PictureTarget& target) {
+  return !is_exr(target) && is_light(target.layer);
 }
 
 }  // namespace
 
+bool is_light(std::string_view layer) noexcept {
+  return layer != "occlusion" && layer != "albedo";
+}
+
 PictureFiles::PictureFiles(std::span<const PictureTarget> targets, unsigned width, unsigned height,
-                           const std::vector<ExrLayerType>& layers, std::optional<float> exposure,
+                           const std::vector<ExrLayerType>& layers, std::optional<Display> display,
                            const std::filesystem::path& directory)
     : targets_(targets),
       width_(width),
-      exposure_(exposure),
+      display_(display),
       waiting_(targets.size()),
       exrs_(targets.size()),
       pngs_(targets.size()) {
@@ -42,7 +46,7 @@ PictureFiles::PictureFiles(std::span<const PictureTarget> targets, unsigned widt
       continue;
     }
     pngs_[i] = std::make_unique<PngWriter>(targets[i].path, width, height);
-    if (exposure_ || !is_light(targets[i])) continue;
+    if (display_ || !shows_light(targets[i])) continue;
     waiting_[i] = std::make_unique<Spool<glm::vec3>>();
     waiting_[i]->spill(directory);
   }
@@ -67,7 +71,7 @@ void PictureFiles::write(const Film& film) {
         waiting_[i]->append(pixels);
         continue;
       }
-      if (is_light(targets_[i])) Display::at_exposure(*exposure_).show(pixels);
+      if (shows_light(targets_[i])) display_->show(pixels);
       pngs_[i]->write(pixels);
     }
     if (std::ranges::any_of(waiting_, [](const auto& light) { return light != nullptr; }))
@@ -75,8 +79,8 @@ void PictureFiles::write(const Film& film) {
   }
 }
 
-std::optional<float> PictureFiles::publish() {
-  std::optional<float> chosen;
+std::optional<Display> PictureFiles::publish() {
+  std::optional<Display> chosen;
   const Display display = meter_.display();
   for (std::size_t i = 0; i < targets_.size(); ++i) {
     if (exrs_[i]) {
@@ -85,7 +89,7 @@ std::optional<float> PictureFiles::publish() {
     }
     if (waiting_[i]) {
       show(*waiting_[i], display, *pngs_[i]);
-      chosen = std::log2(display.gain);
+      chosen = display;
     }
     pngs_[i]->publish();
   }

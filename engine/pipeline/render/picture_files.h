@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/io/file/spool.h"
@@ -16,12 +17,16 @@
 
 namespace ptc {
 
-/// A picture file and the layer that it shows.
+/// A picture file, or a mesh with the light of its vertices, and the layer that it shows.
 struct PictureTarget {
-  std::filesystem::path path;  ///< an .exr gets all layers, a .png one of them
-  /// Layer of a .png, one of kPictureLayers.
+  std::filesystem::path path;  ///< an .exr or .ply gets all layers, a .png or .glb one of them
+  /// Layer of a .png or .glb, and of the colours of a .ply: one of kPictureLayers. In a .glb, whose
+  /// colours are multiplied by those of materials, the beauty is the irradiance.
   std::string layer = "beauty";
 };
+
+/// Says whether a layer is light, whose exposure matters.
+[[nodiscard]] bool is_light(std::string_view layer) noexcept;
 
 /// Writes the files of a picture row by row. Each is published whole or not at all.
 class PictureFiles {
@@ -29,12 +34,13 @@ class PictureFiles {
   /// Creates temporary files.
   /// @param targets   must outlive this
   /// @param layers    of each .exr
-  /// @param exposure   stops by which a .png of light is brightened; occlusion and albedo stay.
-  ///                   Empty: chosen by the beauty of the whole picture, for all layers alike
-  /// @param directory  of the temporary files of pictures whose exposure is chosen
+  /// @param display    how a .png of light is shown; occlusion and albedo stay. Empty: chosen by
+  /// the
+  ///                   beauty of the whole picture, for all layers alike
+  /// @param directory  of the temporary files of pictures whose display is chosen
   /// @throws std::system_error
   PictureFiles(std::span<const PictureTarget> targets, unsigned width, unsigned height,
-               const std::vector<ExrLayerType>& layers, std::optional<float> exposure,
+               const std::vector<ExrLayerType>& layers, std::optional<Display> display,
                const std::filesystem::path& directory);
 
   /// Writes the next rows, from the top of the picture down.
@@ -43,9 +49,9 @@ class PictureFiles {
   void write(const Film& film);
 
   /// Publishes the files one after another. @pre all rows are written
-  /// @return the exposure that was chosen, stops; nothing where none was needed
+  /// @return the display that was chosen; nothing where none was needed
   /// @throws std::system_error
-  std::optional<float> publish();
+  std::optional<Display> publish();
 
   /// Returns the memory that writing takes for each .exr and each .png.
   [[nodiscard]] static std::uint64_t bytes(std::span<const PictureTarget> targets, unsigned width,
@@ -57,9 +63,9 @@ class PictureFiles {
 
   std::span<const PictureTarget> targets_;
   unsigned width_;
-  std::optional<float> exposure_;
-  ExposureMeter meter_;  ///< of the beauty, if the exposure is chosen
-  /// For each target, its light until the exposure is known; null where that is not awaited.
+  std::optional<Display> display_;
+  ExposureMeter meter_;  ///< of the beauty, if the display is chosen
+  /// For each target, its light until the display is known; null where that is not awaited.
   std::vector<std::unique_ptr<Spool<glm::vec3>>> waiting_;
   std::vector<std::unique_ptr<ExrWriter>> exrs_;  ///< for each target; null for a .png
   std::vector<std::unique_ptr<PngWriter>> pngs_;  ///< for each target; null for an .exr

@@ -24,6 +24,10 @@
 
 namespace ptc {
 
+/// How far inside their triangle receivers of baked texels and vertices lie, radii of a surfel, or
+/// in its middle if that is nearer: at its edge they would look through the gap between two discs.
+inline constexpr float kBakedStep = 0.6F;
+
 /// The place where the ray of a sample meets a surface.
 struct PrimaryHit {
   glm::dvec3 position{0};      ///< scene units

@@ -1,6 +1,7 @@
 #include "engine/pipeline/render/render_picture.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -72,7 +73,7 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
     budget.charge("the picture of all groups", subject.pixels() * part.held_bytes);
   } else {
     budget.charge("the files of the picture",
-                  request.vertices ? VertexFiles::bytes(targets)
+                  request.vertices ? VertexFiles::bytes(targets, subject.mesh)
                                    : PictureFiles::bytes(targets, camera.width,
                                                          layer_types(Film(1, 1, extras))));
   }
@@ -100,9 +101,29 @@ void see(Subject& subject, const RenderRequest& request, const Part& part,
     see_mesh(subject);
   } else if (request.vertices) {
     see_vertices(subject, request);
-  } else if (!subject.view) {
+  } else {
     see_texture(subject, request, part.tile, lighting.executor(), progress);
   }
+}
+
+/// The frames that stand for all of a sequence.
+constexpr std::size_t kPilotFrames = 4;
+
+/// Returns the camera of such a frame.
+const Camera& pilot_camera(const std::vector<Camera>& cameras, std::size_t index) {
+  return cameras[index * cameras.size() / std::min(kPilotFrames, cameras.size())];
+}
+
+/// Says whether views of surfels are sparse in all of a few frames.
+bool are_sparse(Subject& subject, const std::vector<Camera>& cameras, float lift,
+                const Lighting& lighting) {
+  bool sparse = true;
+  for (std::size_t k = 0; k < std::min(kPilotFrames, cameras.size()) && sparse; ++k) {
+    subject.camera = pilot_camera(cameras, k);
+    sparse = is_sparse(subject, lift, lighting);
+  }
+  subject.camera = cameras.front();
+  return sparse;
 }
 
 /// Returns receivers that stand for those of all frames: of a few frames, in equal parts.
@@ -110,11 +131,10 @@ void see(Subject& subject, const RenderRequest& request, const Part& part,
 std::vector<Pilot> pilots_of_frames(const Subject& subject, const std::vector<Camera>& cameras,
                                     const std::function<void(const Camera&)>& look,
                                     const Executor& executor) {
-  constexpr std::size_t kFrames = 4;
-  const std::size_t frames = std::min(kFrames, cameras.size());
+  const std::size_t frames = std::min(kPilotFrames, cameras.size());
   std::vector<Pilot> pilots;
   for (std::size_t k = 0; k < frames; ++k) {
-    if (frames > 1) look(cameras[k * cameras.size() / frames]);
+    if (frames > 1) look(pilot_camera(cameras, k));
     std::vector<Pilot> of_frame = pilots_of(subject, executor);
     for (std::size_t i = k; i < of_frame.size(); i += frames)
       pilots.push_back(std::move(of_frame[i]));
@@ -125,7 +145,8 @@ std::vector<Pilot> pilots_of_frames(const Subject& subject, const std::vector<Ca
 
 /// Renders the pictures of a container.
 LightingReport render_part(const RenderRequest& request, std::span<const PictureTarget> targets,
-                           const Part& part, const RowsSeen& done, Progress& progress) {
+                           const Part& part, Continuity& kept, const RowsSeen& done,
+                           Progress& progress) {
   // Open the scene and load what the camera sees
   LightingReport report;
   Subject subject{.side = side_of(request.samples)};
@@ -134,11 +155,12 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
                                          : recorded_lights(lighting.scene(), request.run,
                                                            targets.front().path, progress);
   check_names(request, targets, lights.sky.map_path);
-  const auto of_files = cameras_of_files(request, lighting.scene());
+  auto of_files = cameras_of_files(request, lighting.scene());
   load_subject(subject, request, part.moment, part.emission, lighting.scene(), lights.sky,
                targets.front().path, progress);
   const std::vector<Camera> cameras =
-      cameras_of_frames(request, lighting.scene(), of_files, subject);
+      cameras_of_frames(request, lighting.scene(), of_files, subject, kept);
+  of_files.reset();
   subject.camera = cameras.front();
   SurfelViewBytes view;
   if (subject.has_mesh()) {
@@ -170,7 +192,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
       subject.shadows.of_surfels = std::make_unique<DiscShadows>(
           lighting.scene(), rigs, request.gather.sides, request.back_end, lighting.executor());
     }
-    sparse = is_sparse(subject, request.lift, lighting);
+    sparse = are_sparse(subject, cameras, request.lift, lighting);
     const Stage stage(report.seconds, progress, "view", subject.samples(), "samples");
     see(subject, request, part, view, lighting, progress);
   }
@@ -214,9 +236,17 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   return report;
 }
 
+/// Keeps the display that a picture chose for those that follow it.
+void keep_display(const std::optional<Display>& chosen, Continuity& kept, LightingReport& report) {
+  if (!chosen) return;
+  kept.display = chosen;
+  report.exposure = std::log2(chosen->gain);
+}
+
 /// Renders the light of each group of lights apart, into layers whose sum is the beauty.
 LightingReport render_groups(const RenderRequest& request, std::span<const PictureTarget> targets,
-                             const std::optional<Moment>& moment, Progress& progress) {
+                             const std::optional<Moment>& moment, Continuity& kept,
+                             Progress& progress) {
   const ContainerReader scene(with_directory_under(request.scene, request.run));
   const LightRig rig = request.lights
                            ? *request.lights
@@ -230,6 +260,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
           .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
   const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
+
   // Light the scene for each group
   LightingReport report;
   std::vector<std::unique_ptr<RelitScene>> lit;
@@ -253,6 +284,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
       one.sequence->frames = {number, number};
     }
     std::unique_ptr<Film> sum;
+    LightingReport of_picture;
     for (std::size_t i = 0; i < groups.size(); ++i) {
       one.lights = only_group(rig, groups[i]);
       one.scene = lit[i]->path();
@@ -263,37 +295,37 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
         sum->add_group(group_channel(groups[i]), rows, first);
       };
       const Part part{.emission = groups[i].empty(), .held_bytes = sum_bytes, .moment = moment};
-      add_costs(report, render_part(one, targets, part, add, progress));
+      add_costs(of_picture,
+                render_part(one, targets, part, kept, add, frame == 0 ? progress : silent));
     }
-    PictureFiles files(of_frame, sum->width(), sum->height(), layer_types(*sum), one.exposure,
+    add_run(report, of_picture);
+    PictureFiles files(of_frame, sum->width(), sum->height(), layer_types(*sum), kept.display,
                        roomiest_temp_dir(request.run, targets.front().path));
     files.write(*sum);
-    if (const auto exposure = files.publish()) report.exposure = one.exposure = exposure;
+    keep_display(files.publish(), kept, report);
   }
   return report;
 }
 
-/// Renders the pictures of a container, or bakes one tile of a texture. What the first picture is
-/// exposed by serves all of them.
+/// Renders the pictures of a container, or bakes one tile of a texture.
 LightingReport render_files(const RenderRequest& request, std::span<const PictureTarget> targets,
-                            const Part& part, Progress& progress) {
+                            const Part& part, Continuity& kept, Progress& progress) {
   std::vector<PictureTarget> of_frame(targets.begin(), targets.end());
   std::optional<PictureFiles> files;
-  std::optional<float> exposure, chosen = request.exposure;
+  LightingReport shown;
   const auto write = [&](const Film& rows, unsigned first, const Subject& subject,
                          std::size_t frame) {
     const Camera& camera = subject.camera;
     if (first == 0) {
       if (request.sequence) of_frame = targets_of_frame(targets, request.sequence->frames[frame]);
-      files.emplace(of_frame, camera.width, camera.height, layer_types(rows), chosen,
+      files.emplace(of_frame, camera.width, camera.height, layer_types(rows), kept.display,
                     roomiest_temp_dir(request.run, targets.front().path));
     }
     files->write(rows);
-    if (first + rows.height() < camera.height) return;
-    if (const auto found = files->publish()) exposure = chosen = found;
+    if (first + rows.height() == camera.height) keep_display(files->publish(), kept, shown);
   };
-  LightingReport report = render_part(request, targets, part, write, progress);
-  report.exposure = exposure;
+  LightingReport report = render_part(request, targets, part, kept, write, progress);
+  report.exposure = shown.exposure;
   return report;
 }
 
@@ -310,7 +342,8 @@ LightingReport render_vertices(const RenderRequest& request, std::span<const Pic
     files->write(rows);
     if (first + rows.height() == subject.camera.height) exposure = files->publish();
   };
-  LightingReport report = render_part(request, targets, {}, write, progress);
+  Continuity kept;
+  LightingReport report = render_part(request, targets, {}, kept, write, progress);
   report.exposure = exposure;
   return report;
 }
@@ -327,20 +360,22 @@ LightingReport render_tiles(const RenderRequest& request, std::span<const Pictur
   return bake_tiles(
       tiles, targets,
       [&](std::span<const PictureTarget> files, const TextureTile& tile) {
-        return render_files(request, files, {.tile = tile}, progress);
+        Continuity kept = continuity_of(request);
+        return render_files(request, files, {.tile = tile}, kept, progress);
       },
       progress);
 }
 
-/// Renders pictures of a container, or bakes its textures.
+/// Renders pictures of a container, or bakes its textures or vertices.
 /// @param moment  that is seen of a scene that moves
 LightingReport render_container(const RenderRequest& request,
                                 std::span<const PictureTarget> targets,
-                                const std::optional<Moment>& moment, Progress& progress) {
-  if (request.light_groups) return render_groups(request, targets, moment, progress);
+                                const std::optional<Moment>& moment, Continuity& kept,
+                                Progress& progress) {
+  if (request.light_groups) return render_groups(request, targets, moment, kept, progress);
   if (request.texture) return render_tiles(request, targets, progress);
   if (request.vertices) return render_vertices(request, targets, progress);
-  return render_files(request, targets, {.moment = moment}, progress);
+  return render_files(request, targets, {.moment = moment}, kept, progress);
 }
 
 /// Builds a temporary container of clouds and meshes, and renders it. The camera sees meshes as
@@ -348,7 +383,8 @@ LightingReport render_container(const RenderRequest& request,
 /// @param moment  as for render_container()
 LightingReport render_files_of_scene(const RenderRequest& request,
                                      std::span<const PictureTarget> targets,
-                                     const std::optional<Moment>& moment, Progress& progress) {
+                                     const std::optional<Moment>& moment, Continuity& kept,
+                                     Progress& progress) {
   const BuiltScene scene(request,
                          {.backdrop = request.backdrop,
                           .one_sided = request.one_sided,
@@ -366,21 +402,21 @@ LightingReport render_files_of_scene(const RenderRequest& request,
   } else {
     rendering.camera_files.insert(rendering.camera_files.end(), files.begin(), files.end());
   }
-  LightingReport report = render_container(rendering, targets, moment, progress);
+  LightingReport report = render_container(rendering, targets, moment, kept, progress);
   scene.add_stages(report.seconds);
   return report;
 }
 
 /// Renders the frames of a scene that moves, each from a container of its own.
 LightingReport render_moving(const RenderRequest& request, std::span<const PictureTarget> targets,
-                             Progress& progress) {
+                             Continuity& kept, Progress& progress) {
   LightingReport report;
   RenderRequest one = request;
   for (std::size_t i = 0; i < request.sequence->frames.count(); ++i) {
     const std::int64_t frame = request.sequence->frames[i];
     one.sequence->frames = {frame, frame};
-    add_run(report, render_files_of_scene(one, targets, moment_of(*request.sequence, i), progress));
-    if (!one.exposure) one.exposure = report.exposure;
+    add_run(report,
+            render_files_of_scene(one, targets, moment_of(*request.sequence, i), kept, progress));
   }
   return report;
 }
@@ -390,6 +426,7 @@ LightingReport render_moving(const RenderRequest& request, std::span<const Pictu
 LightingReport render_picture(const RenderRequest& request, std::span<const PictureTarget> targets,
                               Progress& progress) {
   check_request(request, targets);
+  Continuity kept = continuity_of(request);
   const std::uint64_t memory = request.run.memory_bytes;
   const auto move = [&](const std::vector<std::filesystem::path>& files) {
     return request.sequence && moves(read_scene_objects(files, nullptr, memory), memory);
@@ -400,13 +437,13 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
           "the meshes move, but the container does not: all frames show both as they stand. Name "
           "the meshes in place of the container");
     }
-    return render_container(request, targets, {}, progress);
+    return render_container(request, targets, {}, kept, progress);
   }
   check_names(request, targets, request.lights ? request.lights->sky.map_path : "");
   std::vector<std::filesystem::path> files = scene_files(request);
   files.insert(files.end(), request.meshes.begin(), request.meshes.end());
-  if (move(files)) return render_moving(request, targets, progress);
-  return render_files_of_scene(request, targets, {}, progress);
+  if (move(files)) return render_moving(request, targets, kept, progress);
+  return render_files_of_scene(request, targets, {}, kept, progress);
 }
 
 }  // namespace ptc

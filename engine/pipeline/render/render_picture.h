@@ -65,7 +65,7 @@ struct RenderRequest : LightingRequest {
   /// else the gather brings their light, and no ray is cast at them.
   LightSampling light_sampling{.sun_rays = 4, .area_rays = 16, .sky_rays = 0};
   /// Bakes a texture of the meshes, which must have texture coordinates, in place of a picture:
-  /// each texel is what its place on the surface looks like along the normal. `camera` is not used
+  /// each texel is what its place on the surface looks like along the normal. `camera` is empty
   /// then, `size` is 1024 x 1024 when it is empty, and `light_groups` is refused. Names of targets
   /// may hold kTileMark: they stand for a file for each tile of the texture coordinates.
   std::optional<TextureTarget> texture;
@@ -99,7 +99,7 @@ struct RenderRequest : LightingRequest {
 ///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
 ///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
 ///   reflection_occlusion 1  only with LightingRequest::glossy, 0 to 1
-///   irradiance         3   only with `texture`: from lights, sky and surfaces, W / m^2
+///   irradiance         3   only of what is baked: from lights, sky and surfaces, W / m^2
 ///   shadow_NAME        1   only with LightingRequest::shadows: share of a group's light that is
 ///                          hidden, 0 to 1; 0 where no surface is seen
 ///   light_NAME         3   only with `light_groups`: the beauty that is due to a group; the sum of
@@ -109,7 +109,7 @@ struct RenderRequest : LightingRequest {
 /// says. Each layer is the mean over the samples of a pixel, except that `alpha` of a texture
 /// leaves out its margin, and that the layers of estimates are root mean squares, which are upper
 /// bounds on the error of that mean. Each file is published whole or not at all.
-/// @param targets   one or more files, all from one rendering
+/// @param targets   one or more files, all from one rendering, or for each frame of a sequence
 /// @param progress  gets the stages, and notes about the meshes and the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was
 /// @throws RequestError when the request contradicts itself or a setting is out of range;

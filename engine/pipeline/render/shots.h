@@ -36,8 +36,9 @@ struct FrameRange {
 struct SequenceRequest {
   FrameRange frames;
   double frames_per_second = 24;  ///< frame f shows animations of glTF at f / frames_per_second
-  /// Frames in which the camera goes once around its target, to the right at first, about the axis
-  /// that points up; frame 1 is the view without it. 0: it does not.
+  /// Frames in which the camera goes once around its target, or around the middle of what is seen
+  /// if it is that of a file: to the right at first, about the axis that points up; frame 1 is the
+  /// view without it. 0: it does not.
   unsigned turntable = 0;
 };
 

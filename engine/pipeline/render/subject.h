@@ -66,8 +66,8 @@ void see_vertices(Subject& subject, const RenderRequest& request);
 /// The memory of a view of surfels.
 struct SurfelViewBytes {
   std::uint64_t depth = 0;  ///< of its depth buffer
-  /// Memory of the pages that a view of parts keeps; 0 for a view of the whole picture, which is
-  /// made with the pages of the gather, before that begins.
+  /// Memory of the pages of a view of parts, or of views that follow one another; 0 for the only
+  /// view of a whole picture, which is made with the pages of the gather, before that begins.
   std::uint64_t pages = 0;
 };
 

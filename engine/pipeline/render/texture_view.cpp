@@ -17,8 +17,6 @@
 namespace ptc {
 namespace {
 
-constexpr float kStepInwards = 0.6F;  // radii of a surfel
-
 /// Returns the mesh whose positions are texture coordinates in texels, from the upper left corner
 /// of a tile, with the triangles of `mesh`. A triangle that has no place in the tile has no area.
 Mesh flattened(const Mesh& mesh, const glm::uvec2& size, const TextureTile& tile) {
@@ -111,7 +109,7 @@ struct TextureView::Impl {
                               3.0;
     const glm::dvec3 way = mesh.origin + middle - at.position;
     const double length = glm::length(way);
-    return length > 0 ? way * std::min(1.0, double{kStepInwards * radius} / length) : way;
+    return length > 0 ? way * std::min(1.0, double{kBakedStep * radius} / length) : way;
   }
 
   const RayScene& scene;

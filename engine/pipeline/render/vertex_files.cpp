@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -33,9 +34,9 @@ bool is_ply(const PictureTarget& target) {
   return lower_extension(target.path) == ".ply";
 }
 
-/// Says whether a layer is light, whose exposure matters.
-bool is_light(const PictureTarget& target) {
-  return target.layer != "occlusion" && target.layer != "albedo";
+/// Returns the layer that a target shows.
+std::string layer_of(const PictureTarget& target) {
+  return !is_ply(target) && target.layer == "beauty" ? "irradiance" : target.layer;
 }
 
 /// Says whether a layer of films says something about a vertex.
@@ -134,7 +135,6 @@ class GlbMesh {
            {"indices", add(3 * triangles_of[m], 1, kUnsignedInt, "SCALAR", kIndices)},
            {"material", materials_.size()}});
       add_material(mesh.materials[m]);
-      used_.push_back(static_cast<std::uint16_t>(m));
     }
     const glm::dvec3& o = mesh.origin;
     Json node{{"mesh", 0}};
@@ -158,8 +158,9 @@ class GlbMesh {
     return 12 + 8 + json_.size() + 8 + bytes_;
   }
 
-  /// @param gain  by which the light is multiplied
-  void write(BufferedOutput& out, Spool<glm::vec3>& shown, float gain) const {
+  /// @param gain      by which the light is multiplied
+  /// @param coloured  whether it is multiplied by the colours of the vertices, too
+  void write(BufferedOutput& out, Spool<glm::vec3>& shown, float gain, bool coloured) const {
     const auto put32 = [&](std::uint64_t value) { put(out, static_cast<std::uint32_t>(value)); };
     put32(kMagic);
     put32(2);
@@ -173,13 +174,16 @@ class GlbMesh {
     for (const glm::vec3& normal : mesh_.normals) put(out, normal);
     for (const glm::vec2& uv : mesh_.uvs) put(out, glm::vec2(uv.x, 1 - uv.y));
     SpoolReader<glm::vec3> light(shown, 0);
-    for (std::size_t i = 0; i < mesh_.positions.size(); ++i)
-      put(out, glm::clamp(gain * light[i], 0.0F, 1.0F));
-    for (const std::uint16_t material : used_) {
-      for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
-        if (mesh_.material_of[i] == material) put(out, mesh_.triangles[i]);
-      }
+    for (std::size_t i = 0; i < mesh_.positions.size(); ++i) {
+      const glm::vec3 colour = coloured && !mesh_.colours.empty() ? mesh_.colours[i] : glm::vec3(1);
+      put(out, glm::clamp(gain * colour * light[i], 0.0F, 1.0F));
     }
+    // Put the triangles in the order of their materials
+    std::vector<std::uint32_t> order(mesh_.triangles.size()), next(mesh_.materials.size() + 1);
+    for (const std::uint16_t material : mesh_.material_of) ++next[material + 1U];
+    for (std::size_t m = 1; m < next.size(); ++m) next[m] += next[m - 1];
+    for (std::uint32_t i = 0; i < order.size(); ++i) order[next[mesh_.material_of[i]]++] = i;
+    for (const std::uint32_t triangle : order) put(out, mesh_.triangles[triangle]);
   }
 
  private:
@@ -230,7 +234,6 @@ class GlbMesh {
 
   const Mesh& mesh_;
   Json accessors_ = Json::array(), views_ = Json::array(), materials_ = Json::array();
-  std::vector<std::uint16_t> used_;  ///< materials that have triangles
   bool has_strength_ = false;
   std::uint64_t bytes_ = 0;  ///< of the binary chunk
   std::string json_;
@@ -263,7 +266,7 @@ void VertexFiles::write(const Film& film) {
     light.resize(count);
     return light;
   };
-  for (std::size_t i = 0; i < targets_.size(); ++i) shown_[i]->append(shown(targets_[i].layer));
+  for (std::size_t i = 0; i < targets_.size(); ++i) shown_[i]->append(shown(layer_of(targets_[i])));
   meter_.add(shown("irradiance"));
   vertices_ += count;
   if (!has_ply_) return;
@@ -287,26 +290,31 @@ std::optional<float> VertexFiles::publish() {
     names.insert(names.end(), more.begin(), more.end());
   }
   values_.end();
-  const Display usual = exposure_ ? Display::at_exposure(*exposure_) : meter_.display();
+  if (vertices_ != mesh_.positions.size())
+    throw std::logic_error("a baked mesh lacks the light of some vertices");
+  Display usual = exposure_ ? Display::at_exposure(*exposure_) : meter_.display();
+  usual = {.gain = usual.gain / usual.white};  // without a curve, what is bright must stay below 1
   for (std::size_t i = 0; i < targets_.size(); ++i) {
     shown_[i]->end();
     BufferedOutput out(targets_[i].path);
-    Display display = is_light(targets_[i]) ? usual : Display{};
+    const std::string layer = layer_of(targets_[i]);
+    const Display display = is_light(layer) ? usual : Display{};
     if (is_ply(targets_[i])) {
       write_ply(out, mesh_, *shown_[i], display, names, values_);
     } else {
-      display.gain /= display.white;  // without a curve, what is bright must stay below 1
-      GlbMesh(mesh_).write(out, *shown_[i], display.gain);
+      GlbMesh(mesh_).write(out, *shown_[i], display.gain, layer == "irradiance");
     }
-    if (is_light(targets_[i]) && !exposure_) chosen = std::log2(display.gain);
+    if (is_light(layer) && !exposure_) chosen = std::log2(display.gain);
     out.publish();
   }
   return chosen;
 }
 
-std::uint64_t VertexFiles::bytes(std::span<const PictureTarget> targets) noexcept {
-  constexpr std::uint64_t kSpoolBytes = 1 << 19, kOutputBytes = 1 << 20;
-  return kOutputBytes + (targets.size() + 1) * kSpoolBytes;
+std::uint64_t VertexFiles::bytes(std::span<const PictureTarget> targets,
+                                 const Mesh& mesh) noexcept {
+  constexpr std::uint64_t kSpoolBytes = 1 << 19, kOutputBytes = 1 << 20, kMaterialBytes = 8 << 10;
+  return kOutputBytes + (targets.size() + 1) * kSpoolBytes +
+         kMaterialBytes * mesh.materials.size() + sizeof(std::uint32_t) * mesh.triangles.size();
 }
 
 }  // namespace ptc

@@ -22,14 +22,15 @@ namespace ptc {
 ///          the target's layer has them, and all layers as properties: radiance_r, occlusion, ...
 ///   .glb   positions, normals, texture coordinates, materials without their textures, and COLOR_0,
 ///          by which a renderer multiplies the base colour: the target's layer, linear, brightened
-///          by the exposure and cut off at 1
+///          by the exposure and cut off at 1; irradiance is multiplied by colours of the vertices
 ///
 /// Each is published whole or not at all.
 class VertexFiles {
  public:
   /// @param targets    their names end in .ply or .glb; must outlive this
   /// @param mesh       whose vertices are the pixels of the films; must outlive this
-  /// @param exposure   stops by which light is brightened; empty: chosen for all targets alike
+  /// @param exposure   stops by which light is brightened; empty: chosen for all targets alike, so
+  ///                   that at most one vertex in two hundred is too bright without a curve
   /// @param directory  of temporary files
   /// @throws RequestError when a .glb would take 4 GiB or more; std::system_error
   VertexFiles(std::span<const PictureTarget> targets, const Mesh& mesh,
@@ -45,7 +46,8 @@ class VertexFiles {
   std::optional<float> publish();
 
   /// Returns the memory that writing takes.
-  [[nodiscard]] static std::uint64_t bytes(std::span<const PictureTarget> targets) noexcept;
+  [[nodiscard]] static std::uint64_t bytes(std::span<const PictureTarget> targets,
+                                           const Mesh& mesh) noexcept;
 
  private:
   std::span<const PictureTarget> targets_;

@@ -11,8 +11,6 @@
 namespace ptc {
 namespace {
 
-constexpr float kStepInwards = 0.6F;  // radii of a surfel
-
 /// Returns the angle of a triangle at one of its corners, radians.
 double angle_at(const Mesh& mesh, std::uint32_t corner) {
   const auto& triangle = mesh.triangles[corner / 3];
@@ -77,12 +75,12 @@ std::optional<PrimaryHit> VertexView::at(unsigned x, unsigned y) const {
       (mesh.positions[triangle[0]] + mesh.positions[triangle[1]] + mesh.positions[triangle[2]]) /
       3.0F;
   const float way = glm::distance(middle, mesh.positions[vertex]);
-  const float step = way > 0 ? std::min(1.0F, kStepInwards * radius_ / way) : 1;
+  const float step = way > 0 ? std::min(1.0F, kBakedStep * radius_ / way) : 1;
   std::array<float, 3> weights{step / 3, step / 3, step / 3};
   weights[corner % 3] = 1 - 2 * step / 3;
   const SurfaceHit surface = scene_.surface(corner / 3, weights[1], weights[2]);
   return seen_of_mesh(scene_, light_, sampling_, surface, -surface.geometric_normal, lift_,
-                      vertex << 8 | sample);
+                      vertex << 32 | sample);
 }
 
 }  // namespace ptc
