@@ -28,6 +28,7 @@ constexpr std::array kFields{
     FieldName{"classes", "--class"},
     FieldName{"colour_from", "--colour-from"},
     FieldName{"count", "--count"},
+    FieldName{"crop", "--crop"},
     FieldName{"error", "--error"},
     FieldName{"estimate", "--estimate"},
     FieldName{"eye", "--eye"},

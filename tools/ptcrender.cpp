@@ -1,7 +1,9 @@
 // ptcrender: renders a picture of a scene, lit directly by rays and indirectly by its surfels.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "engine/base/error.h"
@@ -12,6 +14,7 @@
 #include "tools/inputs.h"
 #include "tools/option_text.h"
 #include "tools/options.h"
+#include "tools/parse.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
 #include "tools/values.h"
@@ -95,6 +98,21 @@ void declare_picture(ptc::Command& command, Arguments& arguments) {
       ->group(kGroup);
   app.add_option("--camera-name", arguments.request.camera_name, "Take the camera with this name")
       ->type_name("NAME")
+      ->group(kGroup);
+  const auto set_crop = [&request = arguments.request](const std::string& text) {
+    constexpr char kExpected[] =
+        "X0,Y0,X1,Y1 with the first column and row, and those behind the last";
+    const std::vector<double> n = ptc::parse_numbers("--crop", text, {4}, kExpected);
+    request.crop.emplace();
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (!(n[i] >= 0 && n[i] <= 65536 && n[i] == std::floor(n[i])))
+        ptc::refuse("--crop", text, kExpected);
+      (*request.crop)[i] = static_cast<unsigned>(n[i]);
+    }
+  };
+  app.add_option_function<std::string>("--crop", set_crop,
+                                       "Part of the picture that is rendered, in pixels")
+      ->type_name("X0,Y0,X1,Y1")
       ->group(kGroup);
   ptc::add_samples(app, arguments.request.samples)->group(kGroup);
   ptc::add_exposure(app, arguments.request.exposure)->group(kGroup);

@@ -159,7 +159,7 @@ TEST_CASE("exr: rows that come a few at a time make the file that all at once ma
   const std::vector<ExrLayerType> layers{{"", ExrLayerType::Kind::colour, false},
                                          {"depth", ExrLayerType::Kind::scalar, true}};
   write_exr(scratch.path() / "whole.exr", 7, 45, {{layers[0], colour}, {layers[1], scalar}});
-  ExrWriter writer(scratch.path() / "parts.exr", 7, 45, layers);
+  ExrWriter writer(scratch.path() / "parts.exr", ImageWindow::whole(7, 45), layers);
   const auto write = [&](unsigned first, unsigned rows) {
     const std::array<std::span<const float>, 2> values{
         std::span(colour).subspan(std::size_t{first} * 21, std::size_t{rows} * 21),

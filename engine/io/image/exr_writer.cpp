@@ -64,8 +64,11 @@ std::vector<std::string> channel_names(const ExrLayerType& layer) {
   return {prefix + "R", prefix + "G", prefix + "B"};
 }
 
-void check_layers(unsigned width, unsigned height, const std::vector<ExrLayerType>& layers) {
-  if (!is_image_size(width, height)) {
+void check_layers(const ImageWindow& window, const std::vector<ExrLayerType>& layers) {
+  const ImageWindow& w = window;
+  if (!is_image_size(w.width, w.height) || !is_image_size(w.full_width, w.full_height) ||
+      w.x > w.full_width - w.width || w.y > w.full_height - w.height || w.width > w.full_width ||
+      w.height > w.full_height) {
     throw std::invalid_argument("ExrWriter: the size is out of range");
   }
   if (layers.empty()) throw std::invalid_argument("ExrWriter: there is no layer");
@@ -94,7 +97,7 @@ std::size_t value_bytes(const ExrLayerType& layer) {
 }  // namespace
 
 struct ExrWriter::State {
-  unsigned width, height;
+  ImageWindow window;
   std::vector<ExrLayerType> layers;
   OutputFile file;
   PublishedStream stream;
@@ -102,15 +105,15 @@ struct ExrWriter::State {
   unsigned written = 0;                   // rows
   std::vector<std::vector<half>> halves;  // rows of each layer in the type that is stored
 
-  State(const std::filesystem::path& target, unsigned columns, unsigned rows,
-        std::vector<ExrLayerType> of)
-      : width(columns),
-        height(rows),
-        layers(std::move(of)),
-        file(target),
-        stream(file),
-        halves(layers.size()) {
-    Imf::Header header(static_cast<int>(width), static_cast<int>(height));
+  State(const std::filesystem::path& target, const ImageWindow& held, std::vector<ExrLayerType> of)
+      : window(held), layers(std::move(of)), file(target), stream(file), halves(layers.size()) {
+    const auto box = [](unsigned x, unsigned y, unsigned width, unsigned height) {
+      const Imath::V2i low(static_cast<int>(x), static_cast<int>(y));
+      return Imath::Box2i(
+          low, low + Imath::V2i(static_cast<int>(width), static_cast<int>(height)) - Imath::V2i(1));
+    };
+    Imf::Header header(box(0, 0, window.full_width, window.full_height),
+                       box(window.x, window.y, window.width, window.height));
     header.compression() = Imf::ZIP_COMPRESSION;
     for (const ExrLayerType& layer : layers) {
       for (const std::string& name : channel_names(layer))
@@ -125,10 +128,10 @@ struct ExrWriter::State {
   }
 };
 
-ExrWriter::ExrWriter(const std::filesystem::path& target, unsigned width, unsigned height,
+ExrWriter::ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
                      std::vector<ExrLayerType> layers) {
-  check_layers(width, height, layers);
-  state_ = std::make_unique<State>(target, width, height, std::move(layers));
+  check_layers(window, layers);
+  state_ = std::make_unique<State>(target, window, std::move(layers));
 }
 
 ExrWriter::~ExrWriter() = default;
@@ -136,9 +139,9 @@ ExrWriter::~ExrWriter() = default;
 void ExrWriter::write(unsigned rows, std::span<const std::span<const float>> values) {
   // Check the values
   State& s = *state_;
-  if (rows > s.height - s.written || values.size() != s.layers.size())
+  if (rows > s.window.height - s.written || values.size() != s.layers.size())
     throw std::invalid_argument("ExrWriter: rows or layers do not match the picture");
-  const std::size_t pixels = std::size_t{rows} * s.width;
+  const std::size_t pixels = std::size_t{rows} * s.window.width;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (values[i].size() != pixels * s.layers[i].components()) {
       throw std::invalid_argument("ExrWriter: layer '" + s.layers[i].name + "' has " +
@@ -150,7 +153,7 @@ void ExrWriter::write(unsigned rows, std::span<const std::span<const float>> val
 
   // Say where the values of each channel lie
   Imf::FrameBuffer buffer;
-  const Imath::V2i origin(0, static_cast<int>(s.written));
+  const Imath::V2i origin(static_cast<int>(s.window.x), static_cast<int>(s.window.y + s.written));
   for (std::size_t i = 0; i < values.size(); ++i) {
     const ExrLayerType& layer = s.layers[i];
     const auto* base = reinterpret_cast<const char*>(values[i].data());
@@ -162,9 +165,10 @@ void ExrWriter::write(unsigned rows, std::span<const std::span<const float>> val
     const std::vector<std::string> names = channel_names(layer);
     const std::size_t stride = value_bytes(layer) * names.size();
     for (std::size_t c = 0; c < names.size(); ++c) {
-      buffer.insert(names[c], Imf::Slice::Make(pixel_type(layer), base + c * value_bytes(layer),
-                                               origin, std::int64_t{s.width}, std::int64_t{rows},
-                                               stride, stride * s.width));
+      buffer.insert(names[c],
+                    Imf::Slice::Make(pixel_type(layer), base + c * value_bytes(layer), origin,
+                                     std::int64_t{s.window.width}, std::int64_t{rows}, stride,
+                                     stride * s.window.width));
     }
   }
 
@@ -181,7 +185,7 @@ void ExrWriter::write(unsigned rows, std::span<const std::span<const float>> val
 
 void ExrWriter::publish() {
   State& s = *state_;
-  if (s.written != s.height) throw std::invalid_argument("ExrWriter: rows are missing");
+  if (s.written != s.window.height) throw std::invalid_argument("ExrWriter: rows are missing");
   s.picture.reset();
   s.stream.rethrow_failure();
   // Check that all lines are there: when the library has no memory to compress a line, it leaves
@@ -208,7 +212,7 @@ void write_exr(const std::filesystem::path& target, unsigned width, unsigned hei
   std::vector<ExrLayerType> types(layers.begin(), layers.end());
   std::vector<std::span<const float>> values;
   for (const ExrLayer& layer : layers) values.emplace_back(layer.values);
-  ExrWriter writer(target, width, height, std::move(types));
+  ExrWriter writer(target, ImageWindow::whole(width, height), std::move(types));
   writer.write(height, values);
   writer.publish();
 }

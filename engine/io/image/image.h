@@ -73,15 +73,30 @@ struct ExrLayer : ExrLayerType {
   std::vector<float> values;  ///< height x width x components
 };
 
+/// The part of a picture that a file holds.
+struct ImageWindow {
+  unsigned x = 0, y = 0;                     ///< its upper left pixel in the picture
+  unsigned width = 0, height = 0;            ///< pixels
+  unsigned full_width = 0, full_height = 0;  ///< of the picture, pixels
+
+  /// Returns the window that is a whole picture.
+  [[nodiscard]] static ImageWindow whole(unsigned width, unsigned height) noexcept {
+    return {0, 0, width, height, width, height};
+  }
+  [[nodiscard]] bool operator==(const ImageWindow&) const = default;
+};
+
 /// Writes an EXR file of scan lines with ZIP compression, some rows at a time. The file replaces
 /// its target as a whole or not at all.
 /// Memory: bytes().
 class ExrWriter {
  public:
   /// Creates a temporary file for the picture.
-  /// @throws std::system_error; std::invalid_argument when the size is not is_image_size(), there
-  ///         is no layer or two have the same name
-  ExrWriter(const std::filesystem::path& target, unsigned width, unsigned height,
+  /// @param window  that the file holds: its data window; the picture is its display window
+  /// @throws std::system_error; std::invalid_argument when a size is not is_image_size(), the
+  /// window
+  ///         leaves the picture, there is no layer or two have the same name
+  ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
             std::vector<ExrLayerType> layers);
   ~ExrWriter();
   ExrWriter(const ExrWriter&) = delete;

@@ -151,4 +151,20 @@ std::vector<Camera> cameras_of_frames(const RenderRequest& request, const Contai
   return cameras;
 }
 
+ImageWindow window_of(const RenderRequest& request, const Camera& camera) {
+  ImageWindow window = ImageWindow::whole(camera.width, camera.height);
+  if (!request.crop) return window;
+  const auto& [x0, y0, x1, y1] = *request.crop;
+  if (x0 >= x1 || y0 >= y1 || x1 > camera.width || y1 > camera.height) {
+    throw RequestError("crop", fmt::format("`crop` is {},{} to {},{}: it is empty, or leaves the "
+                                           "picture of {} x {} pixels",
+                                           x0, y0, x1, y1, camera.width, camera.height));
+  }
+  window.x = x0;
+  window.y = y0;
+  window.width = x1 - x0;
+  window.height = y1 - y0;
+  return window;
+}
+
 }  // namespace ptc

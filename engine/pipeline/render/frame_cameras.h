@@ -38,4 +38,8 @@ struct Continuity {
     const std::optional<std::vector<MeshCamera>>& of_files, const Subject& subject,
     Continuity& kept);
 
+/// Returns the part of a camera's picture that a request asks for.
+/// @throws RequestError when it is empty or leaves the picture
+[[nodiscard]] ImageWindow window_of(const RenderRequest& request, const Camera& camera);
+
 }  // namespace ptc

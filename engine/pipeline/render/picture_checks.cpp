@@ -131,6 +131,8 @@ void check_request(const RenderRequest& request, std::span<const PictureTarget> 
   }
   require_request(!request.bakes() || (!request.camera && request.camera_name.empty()), "camera",
                   "`camera` is for pictures: what is baked has none");
+  require_request(!request.bakes() || !request.crop, "crop",
+                  "`crop` is for pictures: what is baked is baked whole");
   require_request(!request.camera || request.camera_name.empty(), "camera_name",
                   "`camera_name` and a camera exclude each other");
   require_request(!request.bakes() || !request.light_groups, "light_groups",

@@ -31,21 +31,21 @@ bool is_light(std::string_view layer) noexcept {
   return layer != "occlusion" && layer != "albedo";
 }
 
-PictureFiles::PictureFiles(std::span<const PictureTarget> targets, unsigned width, unsigned height,
+PictureFiles::PictureFiles(std::span<const PictureTarget> targets, const ImageWindow& window,
                            const std::vector<ExrLayerType>& layers, std::optional<Display> display,
                            const std::filesystem::path& directory)
     : targets_(targets),
-      width_(width),
+      width_(window.width),
       display_(display),
       waiting_(targets.size()),
       exrs_(targets.size()),
       pngs_(targets.size()) {
   for (std::size_t i = 0; i < targets.size(); ++i) {
     if (is_exr(targets[i])) {
-      exrs_[i] = std::make_unique<ExrWriter>(targets[i].path, width, height, layers);
+      exrs_[i] = std::make_unique<ExrWriter>(targets[i].path, window, layers);
       continue;
     }
-    pngs_[i] = std::make_unique<PngWriter>(targets[i].path, width, height);
+    pngs_[i] = std::make_unique<PngWriter>(targets[i].path, window.width, window.height);
     if (display_ || !shows_light(targets[i])) continue;
     waiting_[i] = std::make_unique<Spool<glm::vec3>>();
     waiting_[i]->spill(directory);

@@ -65,16 +65,16 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
       kReceiverBytes + (request.estimate ? kEstimateBytes : 0) + (glossy ? sizeof(Reflection) : 0);
   budget.charge("a tile", TileRenderer::kSamplesAtOnce * receiver);
   const FilmExtras extras = extras_of(request);
-  const Camera& camera = subject.camera;
+  const ImageWindow& window = subject.window;
   const unsigned rows =
-      std::min(camera.height, TileRenderer::tile_of(camera.width, subject.side).height);
-  budget.charge("rows of the picture", Film::pixel_bytes(extras) * camera.width * rows);
+      std::min(window.height, TileRenderer::tile_of(window.width, subject.side).height);
+  budget.charge("rows of the picture", Film::pixel_bytes(extras) * window.width * rows);
   if (part.held_bytes > 0) {
     budget.charge("the picture of all groups", subject.pixels() * part.held_bytes);
   } else {
     budget.charge("the files of the picture",
                   request.vertices ? VertexFiles::bytes(targets, subject.mesh)
-                                   : PictureFiles::bytes(targets, camera.width,
+                                   : PictureFiles::bytes(targets, window.width,
                                                          layer_types(Film(1, 1, extras))));
   }
   if (subject.rays) {
@@ -162,6 +162,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
       cameras_of_frames(request, lighting.scene(), of_files, subject, kept);
   of_files.reset();
   subject.camera = cameras.front();
+  subject.window = window_of(request, subject.camera);
   SurfelViewBytes view;
   if (subject.has_mesh()) {
     trace_subject(subject, request, lighting, lights);
@@ -193,7 +194,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
           lighting.scene(), rigs, request.gather.sides, request.back_end, lighting.executor());
     }
     sparse = are_sparse(subject, cameras, request.lift, lighting);
-    const Stage stage(report.seconds, progress, "view", subject.samples(), "samples");
+    const Stage stage(report.seconds, progress, "view", subject.all_samples(), "samples");
     see(subject, request, part, view, lighting, progress);
   }
   const auto look = [&](const Camera& camera) {
@@ -216,6 +217,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
       TileRenderer({.camera = subject.camera,
                     .side = subject.side,
                     .view = *subject.view,
+                    .window = subject.window,
                     .sky = !request.bakes()},
                    subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting)
           .render_all(
@@ -284,13 +286,15 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
       one.sequence->frames = {number, number};
     }
     std::unique_ptr<Film> sum;
+    ImageWindow window;
     LightingReport of_picture;
     for (std::size_t i = 0; i < groups.size(); ++i) {
       one.lights = only_group(rig, groups[i]);
       one.scene = lit[i]->path();
       const auto add = [&](const Film& rows, unsigned first, const Subject& subject, std::size_t) {
         if (!sum) {
-          sum = std::make_unique<Film>(subject.camera.width, subject.camera.height, FilmExtras{});
+          window = subject.window;
+          sum = std::make_unique<Film>(window.width, window.height, FilmExtras{});
         }
         sum->add_group(group_channel(groups[i]), rows, first);
       };
@@ -299,7 +303,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
                 render_part(one, targets, part, kept, add, frame == 0 ? progress : silent));
     }
     add_run(report, of_picture);
-    PictureFiles files(of_frame, sum->width(), sum->height(), layer_types(*sum), kept.display,
+    PictureFiles files(of_frame, window, layer_types(*sum), kept.display,
                        roomiest_temp_dir(request.run, targets.front().path));
     files.write(*sum);
     keep_display(files.publish(), kept, report);
@@ -315,14 +319,13 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
   LightingReport shown;
   const auto write = [&](const Film& rows, unsigned first, const Subject& subject,
                          std::size_t frame) {
-    const Camera& camera = subject.camera;
     if (first == 0) {
       if (request.sequence) of_frame = targets_of_frame(targets, request.sequence->frames[frame]);
-      files.emplace(of_frame, camera.width, camera.height, layer_types(rows), kept.display,
+      files.emplace(of_frame, subject.window, layer_types(rows), kept.display,
                     roomiest_temp_dir(request.run, targets.front().path));
     }
     files->write(rows);
-    if (first + rows.height() == camera.height) keep_display(files->publish(), kept, shown);
+    if (first + rows.height() == subject.window.height) keep_display(files->publish(), kept, shown);
   };
   LightingReport report = render_part(request, targets, part, kept, write, progress);
   report.exposure = shown.exposure;
@@ -340,7 +343,7 @@ LightingReport render_vertices(const RenderRequest& request, std::span<const Pic
                     roomiest_temp_dir(request.run, targets.front().path));
     }
     files->write(rows);
-    if (first + rows.height() == subject.camera.height) exposure = files->publish();
+    if (first + rows.height() == subject.window.height) exposure = files->publish();
   };
   Continuity kept;
   LightingReport report = render_part(request, targets, {}, kept, write, progress);

@@ -58,6 +58,9 @@ struct RenderRequest : LightingRequest {
   std::optional<SequenceRequest> sequence;
   /// Width and height of the picture in pixels; empty: those of the camera.
   std::optional<std::array<unsigned, 2>> size;
+  /// The part of the picture that is rendered: its first column and row, and those behind the last,
+  /// from the upper left corner; empty: all. An .exr keeps its place, a .png is that small.
+  std::optional<std::array<unsigned, 4>> crop;
   unsigned samples = 4;  ///< samples of each pixel, a square number
   /// Lights of the meshes and of the sky; empty: those that the scene was built with.
   std::optional<LightRig> lights;

@@ -125,11 +125,11 @@ void see_vertices(Subject& subject, const RenderRequest& request) {
 
 SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,
                                   std::uint64_t cap, bool again) {
-  const std::uint64_t all = subject.samples() * kSplatBytes;
+  const std::uint64_t all = subject.all_samples() * kSplatBytes;
   const std::uint64_t pages =
       view_bytes(lighting.scene(), lighting.executor().threads(), lighting.back_end());
   if (all <= cap / 4) return {all, again ? pages : 0};
-  const Tile tile = TileRenderer::tile_of(subject.camera.width, subject.side);
+  const Tile tile = TileRenderer::tile_of(subject.window.width, subject.side);
   const std::uint64_t least =
       depth_bytes_for(tile.width * subject.side, tile.height * subject.side);
   return {std::max(cap / 8, least), pages};
@@ -169,11 +169,11 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
   // 2018)
   constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};
   constexpr unsigned kMaxSide = 32;
-  const Camera& camera = subject.camera;
+  const ImageWindow& window = subject.window;
   const unsigned side = subject.side;
   const PilotPlan plan = plan_pilots(subject.samples());
-  const unsigned width = std::min(kMaxSide, camera.width),
-                 height = std::min(kMaxSide, camera.height);
+  const unsigned width = std::min(kMaxSide, window.width),
+                 height = std::min(kMaxSide, window.height);
 
   // Find what the windows see, in twice as many as are wanted: some may see nothing
   std::vector<Pilot> pilots(2 * plan.count);
@@ -182,7 +182,8 @@ std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
       const double turn = kGolden[axis] * static_cast<double>(i + 1);
       return static_cast<unsigned>((turn - std::floor(turn)) * (room + 1.0));
     };
-    const unsigned x0 = place(0, camera.width - width), y0 = place(1, camera.height - height);
+    const unsigned x0 = window.x + place(0, window.width - width),
+                   y0 = window.y + place(1, window.height - height);
     pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
     subject.view->look_at(samples_of({x0, y0, width, height}, side), false);
     std::vector<std::optional<PrimaryHit>> hits(std::size_t{width} * height);

@@ -20,8 +20,9 @@ namespace ptc {
 /// other members.
 struct Subject {
   Camera camera;
-  unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
-  Mesh mesh;          ///< empty: the camera sees the surfels
+  ImageWindow window;  ///< of the camera's picture that is rendered
+  unsigned side = 1;   ///< samples of a pixel lie on a grid of side x side
+  Mesh mesh;           ///< empty: the camera sees the surfels
   std::unique_ptr<RayScene> rays;
   std::unique_ptr<DirectLight> light;
   LightSampling sampling;  ///< shadow rays at a mesh
@@ -33,8 +34,12 @@ struct Subject {
   std::uint64_t baked_bytes = 0;  ///< of the view of a texture or of vertices
 
   [[nodiscard]] bool has_mesh() const noexcept { return !mesh.triangles.empty(); }
-  [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{camera.width} * camera.height; }
+  [[nodiscard]] std::uint64_t pixels() const { return std::uint64_t{window.width} * window.height; }
   [[nodiscard]] std::uint64_t samples() const { return pixels() * side * side; }
+  /// Samples of the whole picture.
+  [[nodiscard]] std::uint64_t all_samples() const {
+    return std::uint64_t{camera.width} * camera.height * side * side;
+  }
 };
 
 /// Returns the memory for meshes. While they are read, only the sky takes any beside them.

@@ -42,14 +42,15 @@ Tile TileRenderer::tile_of(unsigned width, unsigned side) noexcept {
 }
 
 void TileRenderer::render_all(const FilmExtras& extras, const RowsDone& done, Progress& progress) {
-  const Camera& camera = seen_.camera;
+  const ImageWindow& window = seen_.window;
   const unsigned samples = seen_.side * seen_.side;
   const unsigned at_once = std::min(samples, kMaxVariants);
-  const Tile whole = tile_of(camera.width, seen_.side);
-  for (unsigned y = 0; y < camera.height; y += whole.height) {
-    Film film(camera.width, std::min(camera.height - y, whole.height), extras);
-    for (unsigned x = 0; x < camera.width; x += whole.width) {
-      const Tile tile{x, y, std::min(camera.width - x, whole.width), film.height()};
+  const Tile whole = tile_of(window.width, seen_.side);
+  for (unsigned y = 0; y < window.height; y += whole.height) {
+    Film film(window.width, std::min(window.height - y, whole.height), extras);
+    for (unsigned x = 0; x < window.width; x += whole.width) {
+      const Tile tile{window.x + x, window.y + y, std::min(window.width - x, whole.width),
+                      film.height()};
       for (unsigned first = 0; first < samples; first += at_once)
         render(tile, first, std::min(at_once, samples - first), film, progress);
     }
@@ -119,7 +120,7 @@ void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& 
     const std::size_t place = i % tile.pixels();
     const unsigned x = tile.x0 + static_cast<unsigned>(place % tile.width);
     const unsigned y = tile.y0 + static_cast<unsigned>(place / tile.width);
-    const std::size_t pixel = std::size_t{y - tile.y0} * film.width() + x;
+    const std::size_t pixel = std::size_t{y - tile.y0} * film.width() + (x - seen_.window.x);
     if (hits_[i]) {
       if (!lit.estimates.empty()) film.add(pixel, lit.estimates[next], weight);
       if (!lit.reflections.empty()) film.add(pixel, lit.reflections[next], weight);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/base/progress.h"
+#include "engine/io/image/image.h"
 #include "engine/pipeline/light/group_shadows.h"
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/render/film.h"
@@ -26,7 +27,8 @@ struct SeenThrough {
   const Camera& camera;
   unsigned side = 1;  ///< samples of a pixel lie on a grid of side x side
   PrimaryView& view;
-  bool sky = true;  ///< whether samples that meet nothing show the sky, and else stay black
+  ImageWindow window;  ///< of its picture that is rendered
+  bool sky = true;     ///< whether samples that meet nothing show the sky, and else stay black
 };
 
 /// The shadows of groups of lights that a picture shows: those of a mesh or those of surfels, or
@@ -54,8 +56,8 @@ struct Tile {
 /// @param side  samples along the side of a pixel
 [[nodiscard]] SampleRect samples_of(const Tile& tile, unsigned side);
 
-/// Gets the layers of complete rows of a picture.
-/// @param first  the first of the rows
+/// Gets the layers of complete rows of a window.
+/// @param first  the first of the rows, from the top of the window
 using RowsDone = std::function<void(const Film& rows, unsigned first)>;
 
 /// Renders all samples of a picture. Each sample of a pixel is shaded with a variant of its own, so
@@ -83,7 +85,7 @@ class TileRenderer {
 
   /// Renders all samples, one row of tiles after another.
   /// @param extras    of the films
-  /// @param done      gets each row of tiles, from the top of the picture down
+  /// @param done      gets each row of tiles, from the top of the window down
   /// @param progress  advances by one for each sample
   /// @throws as Lighting::shade(), and what `done` throws
   void render_all(const FilmExtras& extras, const RowsDone& done, Progress& progress);
