@@ -67,8 +67,8 @@ std::vector<std::string> channel_names(const ExrLayerType& layer) {
 void check_layers(const ImageWindow& window, const std::vector<ExrLayerType>& layers) {
   const ImageWindow& w = window;
   if (!is_image_size(w.width, w.height) || !is_image_size(w.full_width, w.full_height) ||
-      w.x > w.full_width - w.width || w.y > w.full_height - w.height || w.width > w.full_width ||
-      w.height > w.full_height) {
+      w.width > w.full_width || w.x > w.full_width - w.width || w.height > w.full_height ||
+      w.y > w.full_height - w.height) {
     throw std::invalid_argument("ExrWriter: the size is out of range");
   }
   if (layers.empty()) throw std::invalid_argument("ExrWriter: there is no layer");

@@ -94,8 +94,7 @@ class ExrWriter {
   /// Creates a temporary file for the picture.
   /// @param window  that the file holds: its data window; the picture is its display window
   /// @throws std::system_error; std::invalid_argument when a size is not is_image_size(), the
-  /// window
-  ///         leaves the picture, there is no layer or two have the same name
+  ///         window leaves the picture, there is no layer or two have the same name
   ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
             std::vector<ExrLayerType> layers);
   ~ExrWriter();

@@ -36,8 +36,7 @@ class GltfDocument {
   /// Reads and parses the JSON, but no other file.
   /// @param memory_bytes  cap on the memory of the JSON and of decompressed buffer views
   /// @throws DataError when the file is neither a JSON object nor a GLB of version 2, or the JSON
-  /// is
-  ///         nested too deep; LimitError when it takes more memory; std::system_error
+  ///         is nested too deep; LimitError when it takes more memory; std::system_error
   GltfDocument(const std::filesystem::path& path, std::uint64_t memory_bytes);
 
   /// Returns the path of the file.
@@ -148,7 +147,7 @@ class GltfDocument {
   InputFile file_;
   Json root_;
   Buffer binary_chunk_;
-  // Of the file, found when first needed; then those of decompressed views
+  // Buffers of the file, each found when it is first needed, and then those of decompressed views
   std::vector<std::optional<Buffer>> buffers_;
   std::map<std::uint64_t, View> decompressed_;  // by index of the view
   std::uint64_t view_room_;                     // memory for these, bytes

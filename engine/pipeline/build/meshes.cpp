@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
@@ -79,18 +80,16 @@ void add_in_places(const std::vector<Item>& items, const std::vector<Placement>&
   }
 }
 
-/// Returns the cameras of scene files at a moment.
-std::vector<MeshCamera> scene_cameras(const SceneObjects& scene,
-                                      const std::optional<Moment>& moment) {
-  std::vector<MeshCamera> cameras;
-  for (const SceneCamera& camera : scene.cameras)
-    cameras.push_back(
-        mesh_camera(camera.name, moment ? camera.at(moment->frame) : camera.keys.front().second));
-  return cameras;
-}
-
 std::optional<double> seconds_of(const std::optional<Moment>& moment) {
   return moment ? std::optional(moment->seconds) : std::nullopt;
+}
+
+/// Says whether what is found beside the cameras of a mesh file of a scene is as asked for.
+bool any_file(const SceneObjects& scene, std::uint64_t memory_bytes, const auto& is_so) {
+  return std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
+    return !holds_points(object.file) &&
+           std::invoke(is_so, read_cameras(object.file, {}, memory_bytes));
+  });
 }
 
 /// Collects meshes, and joins them when it is known that all fit.
@@ -274,13 +273,12 @@ class Joiner {
 
 LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const Mesh* also,
                          const MeshChoice& choice, const MeshLimits& limits, Progress& progress,
-                         std::vector<MeshCamera>* cameras, const char* field) {
+                         const char* field) {
   // Read the mesh files
   Joiner joiner(limits, choice, field);
   std::vector<MeshLight> lights;
   const SceneObjects scene =
       read_scene_objects(inputs, &joiner.textures(), limits.reading, choice.moment);
-  if (cameras) *cameras = scene_cameras(scene, choice.moment);
   for (const SceneObject& object : scene.objects) {
     if (holds_points(object.file)) continue;
     MeshFile file = read_mesh(object.file, joiner.room(object));
@@ -288,7 +286,6 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
       progress.note(object.file.string() + ": " + warning);
     }
     add_in_places(file.lights, object.places, lights);
-    if (cameras) add_in_places(file.cameras, object.places, *cameras);
     joiner.add(std::move(file), object);
   }
 
@@ -302,9 +299,15 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   return loaded;
 }
 
-std::vector<MeshCamera> file_cameras(const SceneObjects& scene, const std::optional<Moment>& moment,
+std::vector<MeshCamera> file_cameras(const std::vector<std::filesystem::path>& files,
+                                     const std::optional<Moment>& moment,
                                      std::uint64_t memory_bytes) {
-  std::vector<MeshCamera> cameras = scene_cameras(scene, moment);
+  const SceneObjects scene = read_scene_objects(files, nullptr, memory_bytes, moment);
+  std::vector<MeshCamera> cameras;
+  for (const SceneCamera& camera : scene.cameras) {
+    cameras.push_back(
+        mesh_camera(camera.name, moment ? camera.at(moment->frame) : camera.keys.front().second));
+  }
   for (const SceneObject& object : scene.objects) {
     if (holds_points(object.file)) continue;
     add_in_places(read_cameras(object.file, seconds_of(moment), memory_bytes).cameras,
@@ -313,20 +316,17 @@ std::vector<MeshCamera> file_cameras(const SceneObjects& scene, const std::optio
   return cameras;
 }
 
-bool moves(const SceneObjects& scene, std::uint64_t memory_bytes) {
-  return scene.moves || std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
-           return !holds_points(object.file) &&
-                  read_cameras(object.file, {}, memory_bytes).moves_mesh;
-         });
+bool objects_move(const std::vector<std::filesystem::path>& files, std::uint64_t memory_bytes) {
+  const SceneObjects scene = read_scene_objects(files, nullptr, memory_bytes);
+  return scene.moves || any_file(scene, memory_bytes, &CameraFile::moves_mesh);
 }
 
-bool cameras_may_move(const SceneObjects& scene, std::uint64_t memory_bytes) {
+bool cameras_may_move(const std::vector<std::filesystem::path>& files, std::uint64_t memory_bytes) {
+  const SceneObjects scene = read_scene_objects(files, nullptr, memory_bytes);
   const auto has_keys = [](const SceneCamera& camera) { return camera.keys.size() > 1; };
+  const auto is_animated = [](const CameraFile& file) { return file.animation_seconds > 0; };
   return scene.moves || std::ranges::any_of(scene.cameras, has_keys) ||
-         std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
-           return !holds_points(object.file) &&
-                  read_cameras(object.file, {}, memory_bytes).animation_seconds > 0;
-         });
+         any_file(scene, memory_bytes, is_animated);
 }
 
 Bounds bounds_before_backdrop(const Mesh& mesh) {

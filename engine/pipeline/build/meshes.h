@@ -52,31 +52,30 @@ struct LoadedMeshes {
 /// @param also      a mesh in memory, joined after those of the inputs; null: none
 /// @param limits    of all meshes together
 /// @param progress  gets the warnings of each file as notes that begin with its name
-/// @param cameras   gets the cameras of the files, in the order of file_cameras(); may be null
 /// @param field     the member of the request that names the inputs, for errors
 /// @throws DataError for a file that breaks its format; RequestError when check_mesh() refuses
 ///         `also` or the joined mesh, or append_mesh() refuses to join them; std::system_error
 [[nodiscard]] LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs,
                                        const Mesh* also, const MeshChoice& choice,
                                        const MeshLimits& limits, Progress& progress,
-                                       std::vector<MeshCamera>* cameras = nullptr,
                                        const char* field = "inputs");
 
-/// Returns the cameras of a scene at a moment: those of scene files, then those of mesh files, once
-/// for each place of the file.
-/// @param scene         as read_scene_objects() returns it for the moment
+/// Returns the cameras of mesh and scene files at a moment: those of scene files, then those of
+/// mesh files, once for each place of the file.
 /// @param moment        as for MeshChoice
 /// @param memory_bytes  cap on the memory while a file is read
 /// @throws DataError, LimitError, std::system_error
-[[nodiscard]] std::vector<MeshCamera> file_cameras(const SceneObjects& scene,
-                                                   const std::optional<Moment>& moment,
-                                                   std::uint64_t memory_bytes);
+[[nodiscard]] std::vector<MeshCamera> file_cameras(
+    const std::vector<std::filesystem::path>& files, const std::optional<Moment>& moment = {},
+    std::uint64_t memory_bytes = std::numeric_limits<std::uint64_t>::max());
 
-/// Says whether an object of a scene moves, by its keys or by an animation of its file.
+/// Says whether an object of files moves, by its keys or by an animation of its file.
 /// @throws as file_cameras()
-[[nodiscard]] bool moves(const SceneObjects& scene, std::uint64_t memory_bytes);
-/// Says whether cameras of a scene may move. @throws as file_cameras()
-[[nodiscard]] bool cameras_may_move(const SceneObjects& scene, std::uint64_t memory_bytes);
+[[nodiscard]] bool objects_move(const std::vector<std::filesystem::path>& files,
+                                std::uint64_t memory_bytes);
+/// Says whether cameras of files may move. @throws as file_cameras()
+[[nodiscard]] bool cameras_may_move(const std::vector<std::filesystem::path>& files,
+                                    std::uint64_t memory_bytes);
 
 /// Returns the box around a mesh of load_meshes() that has a backdrop, without the backdrop.
 /// @pre the mesh is in memory

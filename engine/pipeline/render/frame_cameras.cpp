@@ -88,17 +88,13 @@ std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& req
   if (request.camera || request.bakes()) return {};
   const bool is_named = !request.camera_name.empty();
   const std::uint64_t memory = request.run.memory_bytes;
-  const auto cameras_at = [&](const std::vector<std::filesystem::path>& files,
-                              const std::optional<Moment>& moment) {
-    return file_cameras(read_scene_objects(files, nullptr, memory, moment), moment, memory);
-  };
+
   // Find the camera among those of the files, and then of the meshes
-  const bool is_recorded = scene.meta().text.contains(kCameraKey);
   std::vector<std::filesystem::path> files = request.camera_files;
-  std::vector<MeshCamera> still = cameras_at(files, {});
-  if (is_named || (still.empty() && !is_recorded)) {
+  std::vector<MeshCamera> still = file_cameras(files, {}, memory);
+  if (is_named || (still.empty() && !scene.meta().text.contains(kCameraKey))) {
     files.insert(files.end(), request.meshes.begin(), request.meshes.end());
-    still = cameras_at(files, {});
+    still = file_cameras(files, {}, memory);
   }
   if (still.empty() && !is_named) return {};
   const std::size_t index = is_named ? index_of(still, request.camera_name) : 0;
@@ -106,11 +102,11 @@ std::optional<std::vector<MeshCamera>> cameras_of_files(const RenderRequest& req
 
   // Follow it
   const FrameRange& frames = request.sequence->frames;
-  if (!cameras_may_move(read_scene_objects(files, nullptr, memory), memory))
-    return std::vector(frames.count(), still[index]);
+  if (!cameras_may_move(files, memory)) return std::vector(frames.count(), still[index]);
   std::vector<MeshCamera> cameras;
   for (std::size_t i = 0; i < frames.count(); ++i) {
-    const std::vector<MeshCamera> now = cameras_at(files, moment_of(*request.sequence, i));
+    const std::vector<MeshCamera> now =
+        file_cameras(files, moment_of(*request.sequence, i), memory);
     if (now.size() != still.size()) {
       throw DataError(
           fmt::format("{}: a camera is missing at frame {}, because its node has a "

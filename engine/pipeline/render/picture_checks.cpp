@@ -16,10 +16,9 @@
 namespace ptc {
 namespace {
 
-/// @throws RequestError when there is no target, when one has an ending that the run does not
-/// write,
-///         when a layer is unknown or not asked for, or when estimates, shadows or groups have no
-///         file of all layers to go to
+/// @throws RequestError when there is no target, when the ending of one is none that the run
+///         writes, when a layer is unknown or not asked for, or when estimates, shadows or groups
+///         have no file of all layers to go to
 void check_targets(const RenderRequest& request, std::span<const PictureTarget> targets) {
   if (targets.empty()) throw RequestError("targets", "no picture to write is named");
   bool has_all = false;

@@ -1,6 +1,7 @@
 // Primary visibility: the surface that a camera sees behind every sample of a picture.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -24,9 +25,14 @@
 
 namespace ptc {
 
-/// How far inside their triangle receivers of baked texels and vertices lie, radii of a surfel, or
-/// in its middle if that is nearer: at its edge they would look through the gap between two discs.
-inline constexpr float kBakedStep = 0.6F;
+/// Returns which share of the way to the middle of their triangle receivers of baked texels and
+/// vertices go: 0.6 radii of a surfel, or all of it. At an edge they would look through the gap
+/// between two discs of the other side.
+/// @param way, radius  scene units
+[[nodiscard]] inline double baked_step(double way, float radius) noexcept {
+  constexpr float kRadii = 0.6F;
+  return way > 0 ? std::min(1.0, double{kRadii * radius} / way) : 1;
+}
 
 /// The place where the ray of a sample meets a surface.
 struct PrimaryHit {

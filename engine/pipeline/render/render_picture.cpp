@@ -86,62 +86,11 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
   }
   return budget;
 }
+
 /// Gets complete rows of a picture of a subject, from the top down.
 /// @param frame  index of the picture
 using RowsSeen = std::function<void(const Film& rows, unsigned first, const Subject& subject,
                                     std::size_t frame)>;
-
-/// Makes a view of the subject from its camera.
-/// @param progress  advances by one for each sample of a view of surfels
-void see(Subject& subject, const RenderRequest& request, const Part& part,
-         const SurfelViewBytes& bytes, const Lighting& lighting, Progress& progress) {
-  if (!subject.has_mesh()) {
-    see_surfels(subject, request.lift, bytes, lighting, progress);
-  } else if (!request.bakes()) {
-    see_mesh(subject);
-  } else if (request.vertices) {
-    see_vertices(subject, request);
-  } else {
-    see_texture(subject, request, part.tile, lighting.executor(), progress);
-  }
-}
-
-/// The frames that stand for all of a sequence.
-constexpr std::size_t kPilotFrames = 4;
-
-/// Returns the camera of such a frame.
-const Camera& pilot_camera(const std::vector<Camera>& cameras, std::size_t index) {
-  return cameras[index * cameras.size() / std::min(kPilotFrames, cameras.size())];
-}
-
-/// Says whether views of surfels are sparse in all of a few frames.
-bool are_sparse(Subject& subject, const std::vector<Camera>& cameras, float lift,
-                const Lighting& lighting) {
-  bool sparse = true;
-  for (std::size_t k = 0; k < std::min(kPilotFrames, cameras.size()) && sparse; ++k) {
-    subject.camera = pilot_camera(cameras, k);
-    sparse = is_sparse(subject, lift, lighting);
-  }
-  subject.camera = cameras.front();
-  return sparse;
-}
-
-/// Returns receivers that stand for those of all frames: of a few frames, in equal parts.
-/// @param look  makes a view of the subject from a camera
-std::vector<Pilot> pilots_of_frames(const Subject& subject, const std::vector<Camera>& cameras,
-                                    const std::function<void(const Camera&)>& look,
-                                    const Executor& executor) {
-  const std::size_t frames = std::min(kPilotFrames, cameras.size());
-  std::vector<Pilot> pilots;
-  for (std::size_t k = 0; k < frames; ++k) {
-    if (frames > 1) look(pilot_camera(cameras, k));
-    std::vector<Pilot> of_frame = pilots_of(subject, executor);
-    for (std::size_t i = k; i < of_frame.size(); i += frames)
-      pilots.push_back(std::move(of_frame[i]));
-  }
-  if (frames > 1) look(cameras.front());
-  return pilots;
-}
 
 /// Renders the pictures of a container.
 LightingReport render_part(const RenderRequest& request, std::span<const PictureTarget> targets,
@@ -166,7 +115,7 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   SurfelViewBytes view;
   if (subject.has_mesh()) {
     trace_subject(subject, request, lighting, lights);
-    see(subject, request, part, view, lighting, progress);
+    see(subject, request, part.tile, view, lighting, progress);
   } else {
     view = surfel_view_bytes(subject, lighting, request.run.memory_bytes, cameras.size() > 1);
   }
@@ -195,12 +144,12 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
     }
     sparse = are_sparse(subject, cameras, request.lift, lighting);
     const Stage stage(report.seconds, progress, "view", subject.all_samples(), "samples");
-    see(subject, request, part, view, lighting, progress);
+    see(subject, request, part.tile, view, lighting, progress);
   }
   const auto look = [&](const Camera& camera) {
     Progress silent;
     subject.camera = camera;
-    see(subject, request, part, view, lighting, silent);
+    see(subject, request, part.tile, view, lighting, silent);
   };
   lighting.tune([&] { return pilots_of_frames(subject, cameras, look, lighting.executor()); },
                 sparse);
@@ -258,7 +207,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
   const bool emits =
       may_emit(scene) ||
       load_meshes(request.meshes, request.mesh.get(), {.moment = moment},
-                  mesh_limits(request, rig.sky, targets.front().path), silent, nullptr, "meshes")
+                  mesh_limits(request, rig.sky, targets.front().path), silent, "meshes")
           .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
   const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
@@ -357,7 +306,7 @@ LightingReport render_tiles(const RenderRequest& request, std::span<const Pictur
   Progress silent;
   const std::vector<TextureTile> tiles = texture_tiles(
       load_meshes(request.meshes, request.mesh.get(), {request.backdrop, request.one_sided},
-                  mesh_limits(request, {}, targets.front().path), silent, nullptr, "meshes")
+                  mesh_limits(request, {}, targets.front().path), silent, "meshes")
           .mesh);
   return_freed_memory();  // of the meshes, which each tile reads for itself
   return bake_tiles(
@@ -430,9 +379,8 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
                               Progress& progress) {
   check_request(request, targets);
   Continuity kept = continuity_of(request);
-  const std::uint64_t memory = request.run.memory_bytes;
   const auto move = [&](const std::vector<std::filesystem::path>& files) {
-    return request.sequence && moves(read_scene_objects(files, nullptr, memory), memory);
+    return request.sequence && objects_move(files, request.run.memory_bytes);
   };
   if (is_container_alone(request)) {
     if (move(request.meshes)) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -59,14 +60,6 @@ void load_subject(Subject& subject, const RenderRequest& request,
 /// Prepares rays at the subject's mesh, and its lights.
 void trace_subject(Subject& subject, const RenderRequest& request, const Lighting& lighting,
                    const LightRig& lights);
-/// Makes a view of the subject's mesh from its camera. @pre trace_subject()
-void see_mesh(Subject& subject);
-/// Makes a view of the texture of the subject's mesh, and notes what of it is not as one expects.
-/// @pre trace_subject()
-void see_texture(Subject& subject, const RenderRequest& request, const TextureTile& tile,
-                 const Executor& executor, Progress& progress);
-/// Makes a view of the vertices of the subject's mesh. @pre trace_subject()
-void see_vertices(Subject& subject, const RenderRequest& request);
 
 /// The memory of a view of surfels.
 struct SurfelViewBytes {
@@ -81,15 +74,24 @@ struct SurfelViewBytes {
 /// @param again  whether more views are made while the gather runs
 [[nodiscard]] SurfelViewBytes surfel_view_bytes(const Subject& subject, const Lighting& lighting,
                                                 std::uint64_t cap, bool again);
-/// Makes a view of the scene's surfels from the subject's camera.
-/// @param progress  as for view_surfels()
-void see_surfels(Subject& subject, float lift, const SurfelViewBytes& bytes,
-                 const Lighting& lighting, Progress& progress);
-/// Says whether the samples of such a view lie far apart (spec/shading.md#sparse-pictures).
-[[nodiscard]] bool is_sparse(const Subject& subject, float lift, const Lighting& lighting);
+/// Makes a view of the subject from its camera.
+/// @param tile      that is baked, if it is a texture
+/// @param progress  advances by one for each sample of a view of surfels
+/// @pre trace_subject(), if it has a mesh
+void see(Subject& subject, const RenderRequest& request, const TextureTile& tile,
+         const SurfelViewBytes& bytes, const Lighting& lighting, Progress& progress);
 
-/// Returns windows of receivers that stand for all receivers of a picture. Windows in which the
-/// camera meets nothing are left out.
-[[nodiscard]] std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor);
+/// Says whether the samples of views of surfels lie far apart in all of a few frames
+/// (spec/shading.md#sparse-pictures). The subject keeps the camera of the first.
+[[nodiscard]] bool are_sparse(Subject& subject, const std::vector<Camera>& cameras, float lift,
+                              const Lighting& lighting);
+
+/// Returns windows of receivers that stand for those of all frames: of a few frames, in equal
+/// parts.
+/// @param look  makes a view of the subject from a camera
+[[nodiscard]] std::vector<Pilot> pilots_of_frames(const Subject& subject,
+                                                  const std::vector<Camera>& cameras,
+                                                  const std::function<void(const Camera&)>& look,
+                                                  const Executor& executor);
 
 }  // namespace ptc

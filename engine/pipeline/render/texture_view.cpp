@@ -99,8 +99,7 @@ struct TextureView::Impl {
            (covers[std::size_t{at.y} * row_bytes + at.x / 8] >> at.x % 8 & 1) != 0;
   }
 
-  /// Returns the step of a receiver away from the edge of its triangle, towards its middle. Right
-  /// at a wall it would look through a gap between two discs of the other one.
+  /// Returns the step of a receiver away from the edge of its triangle, as baked_step() has it.
   [[nodiscard]] glm::dvec3 step_inwards(const SurfaceHit& at) const {
     const Mesh& mesh = scene.mesh();
     const auto& [a, b, c] = mesh.triangles[at.triangle];
@@ -108,8 +107,7 @@ struct TextureView::Impl {
                                glm::dvec3(mesh.positions[c])) /
                               3.0;
     const glm::dvec3 way = mesh.origin + middle - at.position;
-    const double length = glm::length(way);
-    return length > 0 ? way * std::min(1.0, double{kBakedStep * radius} / length) : way;
+    return way * baked_step(glm::length(way), radius);
   }
 
   const RayScene& scene;

@@ -35,9 +35,7 @@ class TextureView : public PrimaryView {
   /// @param scene, light  of a mesh with texture coordinates; must outlive the view
   /// @param size    width and height of the texture, texels
   /// @param side    samples along the side of a texel
-  /// @param radius  of the surfels, scene units; receivers step 0.6 of it towards the middle of
-  /// their
-  ///                triangle, or up to there
+  /// @param radius  of the surfels, scene units, by which receivers step inside (baked_step())
   /// @param lift    height of receivers above the mesh, scene units
   /// @throws RequestError when the mesh has no texture coordinates
   TextureView(const RayScene& scene, const DirectLight& light, const LightSampling& sampling,

@@ -39,11 +39,6 @@ std::string layer_of(const PictureTarget& target) {
   return !is_ply(target) && target.layer == "beauty" ? "irradiance" : target.layer;
 }
 
-/// Says whether a layer of films says something about a vertex.
-bool is_kept(const ExrLayerType& layer) {
-  return layer.name != "alpha";
-}
-
 /// Returns the names of a layer's components, as those of shaded points are named.
 std::vector<std::string> component_names(const ExrLayerType& layer) {
   const std::string name = layer.name.empty() ? "radiance" : layer.name;
@@ -116,10 +111,10 @@ void write_ply(BufferedOutput& out, const Mesh& mesh, Spool<glm::vec3>& shown,
 /// Writes a mesh as GLB, whose parts are put together in the order of its binary chunk.
 class GlbMesh {
  public:
-  explicit GlbMesh(const Mesh& mesh) : mesh_(mesh) {
-    // Group the triangles by material
-    std::vector<std::uint64_t> triangles_of(mesh.materials.size());
-    for (const std::uint16_t material : mesh.material_of) ++triangles_of[material];
+  explicit GlbMesh(const Mesh& mesh) : mesh_(mesh), first_(mesh.materials.size() + 1) {
+    // Find where the triangles of each material begin in their order
+    for (const std::uint16_t material : mesh.material_of) ++first_[material + 1U];
+    for (std::size_t m = 1; m < first_.size(); ++m) first_[m] += first_[m - 1];
     const std::uint64_t vertices = mesh.positions.size();
     Json attributes;
     attributes["POSITION"] = add(vertices, 3, kFloat, "VEC3", kVertices);
@@ -128,12 +123,12 @@ class GlbMesh {
     if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = add(vertices, 2, kFloat, "VEC2", kVertices);
     attributes["COLOR_0"] = add(vertices, 3, kFloat, "VEC3", kVertices);
     Json primitives = Json::array();
-    for (std::size_t m = 0; m < triangles_of.size(); ++m) {
-      if (triangles_of[m] == 0) continue;
-      primitives.push_back(
-          {{"attributes", attributes},
-           {"indices", add(3 * triangles_of[m], 1, kUnsignedInt, "SCALAR", kIndices)},
-           {"material", materials_.size()}});
+    for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
+      const std::uint64_t triangles = first_[m + 1] - first_[m];
+      if (triangles == 0) continue;
+      primitives.push_back({{"attributes", attributes},
+                            {"indices", add(3 * triangles, 1, kUnsignedInt, "SCALAR", kIndices)},
+                            {"material", materials_.size()}});
       add_material(mesh.materials[m]);
     }
     const glm::dvec3& o = mesh.origin;
@@ -179,9 +174,7 @@ class GlbMesh {
       put(out, glm::clamp(gain * colour * light[i], 0.0F, 1.0F));
     }
     // Put the triangles in the order of their materials
-    std::vector<std::uint32_t> order(mesh_.triangles.size()), next(mesh_.materials.size() + 1);
-    for (const std::uint16_t material : mesh_.material_of) ++next[material + 1U];
-    for (std::size_t m = 1; m < next.size(); ++m) next[m] += next[m - 1];
+    std::vector<std::uint32_t> order(mesh_.triangles.size()), next = first_;
     for (std::uint32_t i = 0; i < order.size(); ++i) order[next[mesh_.material_of[i]]++] = i;
     for (const std::uint32_t triangle : order) put(out, mesh_.triangles[triangle]);
   }
@@ -233,6 +226,7 @@ class GlbMesh {
   }
 
   const Mesh& mesh_;
+  std::vector<std::uint32_t> first_;  ///< triangle of each material, and the end
   Json accessors_ = Json::array(), views_ = Json::array(), materials_ = Json::array();
   bool has_strength_ = false;
   std::uint64_t bytes_ = 0;  ///< of the binary chunk
@@ -244,13 +238,14 @@ class GlbMesh {
 VertexFiles::VertexFiles(std::span<const PictureTarget> targets, const Mesh& mesh,
                          std::optional<float> exposure, const std::filesystem::path& directory)
     : targets_(targets), mesh_(mesh), exposure_(exposure) {
-  for (const PictureTarget& target : targets) {
-    has_ply_ |= is_ply(target);
-    if (!is_ply(target) && GlbMesh(mesh).file_bytes() > UINT32_MAX) {
-      throw RequestError("targets", target.path.string() +
-                                        " would take 4 GiB or more, which a .glb cannot: choose "
-                                        "a .ply");
-    }
+  has_ply_ = std::ranges::any_of(targets, is_ply);
+  const auto glb = std::ranges::find_if_not(targets, is_ply);
+  if (glb != targets.end() && GlbMesh(mesh).file_bytes() > UINT32_MAX) {
+    throw RequestError("targets", glb->path.string() +
+                                      " would take 4 GiB or more, which a .glb cannot: choose a "
+                                      ".ply");
+  }
+  for (std::size_t i = 0; i < targets.size(); ++i) {
     shown_.push_back(std::make_unique<Spool<glm::vec3>>());
     shown_.back()->spill(directory);
   }
@@ -272,7 +267,7 @@ void VertexFiles::write(const Film& film) {
   if (!has_ply_) return;
   layers_.clear();
   std::vector<Film::Layer> layers = film.layers();
-  std::erase_if(layers, [](const Film::Layer& layer) { return !is_kept(layer.type); });
+  std::erase_if(layers, [](const Film::Layer& layer) { return layer.type.name == "alpha"; });
   for (const Film::Layer& layer : layers) layers_.push_back(layer.type);
   for (std::size_t i = 0; i < count; ++i) {
     for (const Film::Layer& layer : layers) {

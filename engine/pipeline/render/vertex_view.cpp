@@ -74,8 +74,8 @@ std::optional<PrimaryHit> VertexView::at(unsigned x, unsigned y) const {
   const glm::vec3 middle =
       (mesh.positions[triangle[0]] + mesh.positions[triangle[1]] + mesh.positions[triangle[2]]) /
       3.0F;
-  const float way = glm::distance(middle, mesh.positions[vertex]);
-  const float step = way > 0 ? std::min(1.0F, kBakedStep * radius_ / way) : 1;
+  const auto step = static_cast<float>(
+      baked_step(static_cast<double>(glm::distance(middle, mesh.positions[vertex])), radius_));
   std::array<float, 3> weights{step / 3, step / 3, step / 3};
   weights[corner % 3] = 1 - 2 * step / 3;
   const SurfaceHit surface = scene_.surface(corner / 3, weights[1], weights[2]);

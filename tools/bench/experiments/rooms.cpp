@@ -117,8 +117,8 @@ BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
     if (options.lights) request.lights = options.lights;
     Progress silent;  // the build reads the files again and reports what it leaves out
     room.mesh =
-        load_meshes(request.inputs, nullptr, {.backdrop = choice.backdrop}, {}, silent, &cameras)
-            .mesh;
+        load_meshes(request.inputs, nullptr, {.backdrop = choice.backdrop}, {}, silent).mesh;
+    cameras = file_cameras(request.inputs);
   } else {
     room.mesh = choice.name == "city" ? city_mesh(options.points) : lit.mesh;
   }

@@ -155,9 +155,8 @@ LitScene build_scene(const SceneChoice& choice, const SceneOptions& options,
   const bool procedural = request.mesh != nullptr;
   if (!choice.file.empty()) {
     Progress silent;  // the build reads the file again and reports what it leaves out
-    lit.mesh =
-        load_meshes(request.inputs, nullptr, {.backdrop = choice.backdrop}, {}, silent, &cameras)
-            .mesh;
+    lit.mesh = load_meshes(request.inputs, nullptr, {.backdrop = choice.backdrop}, {}, silent).mesh;
+    cameras = file_cameras(request.inputs);
   } else if (!procedural && options.rays) {
     lit.mesh = city_mesh(options.points);
   }
