@@ -208,7 +208,7 @@ TEST_CASE("gltf animation: parents carry their children, and animations act toge
   scene.animate(2, "rotation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0, kHalf, kHalf});
   scene.animate(2, "translation", "LINEAR", {0, 2}, {0, 0, 0, 0, 0, 4});
   scene.animate(0, "scale", "STEP", {0, 0.5}, {1, 1, 1, 3, 1, 1});
-  // Of two that move one property the first one counts
+  // Of two animations that move one property, the first one counts
   scene.animate(2, "translation", "LINEAR", {0, 9}, {7, 7, 7, 8, 8, 8});
   CHECK(near(scene.corner(0, 1), {0, 2, 2}));
   CHECK(near(scene.corner(1, 1), {0, 8, 2}));

@@ -20,11 +20,10 @@
 #include <glm/gtc/quaternion.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/gltf_numbers.h"
 
 namespace ptc {
 namespace {
-
-constexpr std::uint64_t kFloat = 5126;  // componentType
 
 // Returns a rotation of unit length; one of length 0 turns nothing.
 glm::dquat unit_rotation(std::span<const double> r) {
@@ -173,7 +172,7 @@ bool GltfAnimation::apply(const Channel& channel, std::span<double> property) {
   const Keys& keys = find_keys(*input);
   const GltfDocument::Elements values = document_.find_elements(*output, property.size());
   const bool is_rotation = property.size() == 4;
-  if (values.type != kFloat && !(is_rotation && values.normalised))
+  if (values.type != kGltfFloat && !(is_rotation && values.normalised))
     document_.fail(name + " has values that are neither floats nor normalised rotations");
   const std::uint64_t of_key = how == Interpolation::cubic ? 3 : 1;
   if (values.count % of_key != 0 || values.count / of_key != keys.count) {
@@ -192,7 +191,7 @@ const GltfAnimation::Keys& GltfAnimation::find_keys(std::uint64_t accessor) {
   if (known != keys_.end()) return known->second;
   const std::string name = "accessor " + std::to_string(accessor);
   const GltfDocument::Elements times = document_.find_elements(accessor, 1);
-  if (times.type != kFloat) document_.fail(name + " has times that are not floats");
+  if (times.type != kGltfFloat) document_.fail(name + " has times that are not floats");
   if (times.count == 0) document_.fail(name + " has no times");
   count_reads(times.count);
   const double wanted = time_.value_or(0);

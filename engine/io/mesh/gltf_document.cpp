@@ -22,16 +22,11 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/gltf_numbers.h"
+#include "engine/io/mesh/json_meter.h"
 
 namespace ptc {
 namespace {
-
-static_assert(std::endian::native == std::endian::little, "glTF buffers are little-endian");
-
-constexpr std::uint32_t kGlbMagic = 0x46546c67;  // "glTF"
-constexpr std::uint32_t kJsonChunk = 0x4e4f534a;
-constexpr std::uint32_t kBinaryChunk = 0x004e4942;
-constexpr int kMaxDepth = 128;  // of nested arrays and objects
 
 std::uint32_t u32_at(std::span<const std::byte> bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -71,57 +66,6 @@ std::optional<std::vector<std::byte>> decode_base64(std::string_view text) {
   return bytes;
 }
 
-// The numbers of an accessor.
-struct Component {
-  std::size_t bytes;
-  double scale;  // greatest value of a normalised integer, which stands for 1
-};
-
-// Returns the numbers of a componentType (section 3.6.2.2), or nothing when it is unknown.
-std::optional<Component> component_of(std::uint64_t type) {
-  switch (type) {
-    case 5120:
-      return Component{1, 127};
-    case 5121:
-      return Component{1, 255};
-    case 5122:
-      return Component{2, 32767};
-    case 5123:
-      return Component{2, 65535};
-    case 5125:
-      return Component{4, 4294967295.0};
-    case 5126:
-      return Component{4, 1};
-    default:
-      return std::nullopt;
-  }
-}
-
-template <typename T>
-double load_as(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return static_cast<double>(value);
-}
-
-// Reads a number of a known componentType.
-double load(const std::byte* from, std::uint64_t type) {
-  switch (type) {
-    case 5120:
-      return load_as<std::int8_t>(from);
-    case 5121:
-      return load_as<std::uint8_t>(from);
-    case 5122:
-      return load_as<std::int16_t>(from);
-    case 5123:
-      return load_as<std::uint16_t>(from);
-    case 5125:
-      return load_as<std::uint32_t>(from);
-    default:
-      return load_as<float>(from);
-  }
-}
-
 // Refuses a document whose JSON takes more memory than there is.
 [[noreturn]] void refuse_room(const std::filesystem::path& path, std::uint64_t bytes) {
   throw LimitError(path.string() + ": its JSON does not fit in `run.memory_bytes`: it takes " +
@@ -135,56 +79,6 @@ double load(const std::byte* from, std::uint64_t type) {
                    "`run.memory_bytes`: they take " +
                    std::to_string((bytes >> 20) + 1) + " MiB or more");
 }
-
-// Measures the memory that parsed JSON takes, without keeping it.
-class JsonMeter : public nlohmann::json_sax<nlohmann::json> {
- public:
-  [[nodiscard]] std::uint64_t bytes() const noexcept { return bytes_; }
-  [[nodiscard]] bool too_deep() const noexcept { return too_deep_; }
-
-  bool null() override { return value(0); }
-  bool boolean(bool /*value*/) override { return value(0); }
-  bool number_integer(number_integer_t /*value*/) override { return value(0); }
-  bool number_unsigned(number_unsigned_t /*value*/) override { return value(0); }
-  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override {
-    return value(0);
-  }
-  bool string(string_t& text) override { return value(text.size()); }
-  bool binary(binary_t& /*value*/) override { return value(0); }
-  bool key(string_t& text) override {
-    bytes_ += text.size();
-    return true;
-  }
-  bool start_object(std::size_t /*elements*/) override { return open(); }
-  bool end_object() override { return close(); }
-  bool start_array(std::size_t /*elements*/) override { return open(); }
-  bool end_array() override { return close(); }
-  // The parser that keeps the values reports what is no JSON
-  bool parse_error(std::size_t /*at*/, const std::string& /*token*/,
-                   const nlohmann::detail::exception& /*error*/) override {
-    return false;
-  }
-
- private:
-  bool value(std::size_t string_bytes) {
-    constexpr std::uint64_t kValueBytes = 96;  // of a member of an object, its key included
-    constexpr std::uint64_t kCopies = 3;       // of a string, while it is read and kept
-    bytes_ += kValueBytes + kCopies * string_bytes;
-    return true;
-  }
-  bool open() {
-    too_deep_ |= ++depth_ > kMaxDepth;
-    return value(0) && !too_deep_;
-  }
-  bool close() {
-    --depth_;
-    return true;
-  }
-
-  std::uint64_t bytes_ = 0;
-  int depth_ = 0;
-  bool too_deep_ = false;
-};
 
 // Returns the numbers in an element of a type, or 0 for matrices and unknown types.
 std::size_t components_of(const std::string& type) {
@@ -258,10 +152,10 @@ void GltfDocument::read_chunks(std::uint64_t memory_bytes) {
     if (length > file_.size() - at) {
       fail("offset " + std::to_string(at) + ": a GLB chunk reaches past the end of the file");
     }
-    if ((chunk == 0) != (type == kJsonChunk))
+    if ((chunk == 0) != (type == kGlbJson))
       fail("the first chunk of a GLB, and no other, must be JSON");
     if (chunk == 0) parse(read_text(at, length, memory_bytes), memory_bytes);
-    if (chunk == 1 && type == kBinaryChunk) {
+    if (chunk == 1 && type == kGlbBinary) {
       binary_chunk_.file = &file_;
       binary_chunk_.offset = at;
       binary_chunk_.length = length;
@@ -462,7 +356,7 @@ GltfDocument::Elements GltfDocument::find_shape(std::uint64_t index, std::size_t
   const Json& accessor = at("accessors", index);
   const std::string name = "accessor " + std::to_string(index);
   const std::uint64_t type = unsigned_at(accessor, "componentType").value_or(0);
-  if (!component_of(type)) fail(name + " has an unknown componentType");
+  if (!gltf_number(type)) fail(name + " has an unknown componentType");
   const auto shape = accessor.find("type");
   if (shape == accessor.end() || !shape->is_string() ||
       components_of(shape->get<std::string>()) != components) {
@@ -490,7 +384,7 @@ GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::siz
   // Check that all elements lie in the buffer view
   const View view = find_view(*view_index);
   const std::uint64_t offset = unsigned_at(accessor, "byteOffset").value_or(0);
-  const std::uint64_t element_bytes = component_of(found.type)->bytes * components;
+  const std::uint64_t element_bytes = gltf_number(found.type)->bytes * components;
   found.stride = unsigned_at(at("bufferViews", *view_index), "byteStride").value_or(element_bytes);
   if (found.stride < element_bytes) fail(name + " has elements that overlap");
   // This is (count - 1) * stride + element_bytes > view.length - offset without overflow
@@ -507,8 +401,8 @@ GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::siz
 void GltfDocument::read(const Elements& elements,
                         const std::function<void(std::span<const double>)>& take) const {
   constexpr std::uint64_t kBlockBytes = 1 << 18;
-  const Component component = *component_of(elements.type);
-  const std::uint64_t element_bytes = component.bytes * elements.components;
+  const GltfNumber number = *gltf_number(elements.type);
+  const std::uint64_t element_bytes = number.bytes * elements.components;
   const std::uint64_t at_once = std::max<std::uint64_t>(1, kBlockBytes / elements.stride);
   const Buffer& buffer = *buffers_[elements.buffer];
   std::vector<std::byte> bytes;
@@ -519,8 +413,9 @@ void GltfDocument::read(const Elements& elements,
     buffer.part(elements.offset + first * elements.stride, bytes.size()).read(0, bytes);
     for (std::uint64_t i = 0; i < count; ++i) {
       for (std::size_t k = 0; k < elements.components; ++k) {
-        const double value = load(&bytes[i * elements.stride + k * component.bytes], elements.type);
-        values[k] = elements.normalised ? std::max(-1.0, value / component.scale) : value;
+        const double value =
+            load_gltf_number(&bytes[i * elements.stride + k * number.bytes], elements.type);
+        values[k] = elements.normalised ? std::max(-1.0, value / number.scale) : value;
       }
       take(std::span(values).first(elements.components));
     }

@@ -25,6 +25,7 @@
 #include <draco/mesh/mesh.h>
 
 #include "engine/base/error.h"
+#include "engine/io/mesh/gltf_numbers.h"
 
 namespace ptc {
 namespace {
@@ -177,32 +178,23 @@ void decode(const std::vector<std::byte>& stream, const DracoMesh::Shape& shape,
   }
 }
 
-template <typename T>
-double load(const std::uint8_t* from, bool normalised) {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  const auto number = static_cast<double>(value);
-  if (!std::is_integral_v<T> || !normalised) return number;
-  return std::max(-1.0, number / static_cast<double>(std::numeric_limits<T>::max()));
-}
-
-// Returns the function that reads a number of a type, or null for types that glTF does not have.
-double (*loader(draco::DataType type))(const std::uint8_t*, bool) {
+// Returns the componentType of a type of the library; 0 for types that glTF does not have.
+std::uint64_t component_type(draco::DataType type) {
   switch (type) {
     case draco::DT_INT8:
-      return load<std::int8_t>;
+      return kGltfInt8;
     case draco::DT_UINT8:
-      return load<std::uint8_t>;
+      return kGltfUint8;
     case draco::DT_INT16:
-      return load<std::int16_t>;
+      return kGltfInt16;
     case draco::DT_UINT16:
-      return load<std::uint16_t>;
+      return kGltfUint16;
     case draco::DT_UINT32:
-      return load<std::uint32_t>;
+      return kGltfUint32;
     case draco::DT_FLOAT32:
-      return load<float>;
+      return kGltfFloat;
     default:
-      return nullptr;
+      return 0;
   }
 }
 
@@ -251,12 +243,14 @@ void DracoMesh::read(std::uint64_t id, const Reading& reading,
           ? nullptr
           : mesh_->GetAttributeByUniqueId(static_cast<std::uint32_t>(id));
   if (attribute == nullptr) fail(name + " does not exist");
-  const auto load_number = loader(attribute->data_type());
-  if (load_number == nullptr || attribute->num_components() != reading.components)
+  const std::uint64_t type = component_type(attribute->data_type());
+  const std::optional<GltfNumber> number = gltf_number(type);
+  if (!number || attribute->num_components() != reading.components)
     fail(name + " has other numbers than its accessor");
-  const bool normalised = reading.normalised || (reading.may_normalise && attribute->normalized());
-  const auto number_bytes = static_cast<std::size_t>(draco::DataTypeLength(attribute->data_type()));
-  const std::size_t bytes = number_bytes * reading.components;
+  const bool normalised =
+      type != kGltfFloat &&
+      (reading.normalised || (reading.may_normalise && attribute->normalized()));
+  const std::size_t bytes = number->bytes * reading.components;
 
   // The library does not promise that each point has a value inside the buffer
   const std::size_t size = attribute->buffer() == nullptr ? 0 : attribute->buffer()->data_size();
@@ -270,9 +264,12 @@ void DracoMesh::read(std::uint64_t id, const Reading& reading,
                         value * static_cast<std::uint64_t>(attribute->byte_stride());
     if (value >= attribute->size() || offset > size || bytes > size - offset)
       fail(name + " lacks values");
-    const std::uint8_t* const from = attribute->buffer()->data() + offset;
-    for (std::size_t k = 0; k < reading.components; ++k)
-      values[k] = load_number(from + k * number_bytes, normalised);
+    const auto* const from =
+        reinterpret_cast<const std::byte*>(attribute->buffer()->data() + offset);
+    for (std::size_t k = 0; k < reading.components; ++k) {
+      const double loaded = load_gltf_number(from + k * number->bytes, type);
+      values[k] = normalised ? std::max(-1.0, loaded / number->scale) : loaded;
+    }
     take(std::span(values).first(reading.components));
   }
 }

@@ -3,11 +3,12 @@
 
 #include <vector>
 
+#include "engine/io/mesh/gltf_numbers.h"
+
 namespace ptc {
 namespace {
 
 constexpr std::uint64_t kTriangles = 4;  // mode
-constexpr std::uint64_t kFloat = 5126;   // componentType
 
 }  // namespace
 
@@ -85,7 +86,7 @@ void GltfPrimitive::read(const char* attribute, std::size_t components,
   decoded_->read(*document_.unsigned_at(*compressed_, attribute),
                  {.components = components,
                   .normalised = shape.normalised,
-                  .may_normalise = shape.type == kFloat},
+                  .may_normalise = shape.type == kGltfFloat},
                  take);
 }
 

@@ -19,6 +19,7 @@
 #include "engine/base/error.h"
 #include "engine/io/file/buffered_output.h"
 #include "engine/io/image/srgb.h"
+#include "engine/io/mesh/gltf_numbers.h"
 #include "engine/io/text/text.h"
 
 namespace ptc {
@@ -26,8 +27,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
-constexpr int kFloat = 5126, kUnsignedInt = 5125;   // types of components
 constexpr int kVertices = 34962, kIndices = 34963;  // targets of buffer views
 
 bool is_ply(const PictureTarget& target) {
@@ -117,17 +116,19 @@ class GlbMesh {
     for (std::size_t m = 1; m < first_.size(); ++m) first_[m] += first_[m - 1];
     const std::uint64_t vertices = mesh.positions.size();
     Json attributes;
-    attributes["POSITION"] = add(vertices, 3, kFloat, "VEC3", kVertices);
+    attributes["POSITION"] = add(vertices, 3, kGltfFloat, "VEC3", kVertices);
     set_bounds();
-    if (!mesh.normals.empty()) attributes["NORMAL"] = add(vertices, 3, kFloat, "VEC3", kVertices);
-    if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = add(vertices, 2, kFloat, "VEC2", kVertices);
-    attributes["COLOR_0"] = add(vertices, 3, kFloat, "VEC3", kVertices);
+    if (!mesh.normals.empty())
+      attributes["NORMAL"] = add(vertices, 3, kGltfFloat, "VEC3", kVertices);
+    if (!mesh.uvs.empty())
+      attributes["TEXCOORD_0"] = add(vertices, 2, kGltfFloat, "VEC2", kVertices);
+    attributes["COLOR_0"] = add(vertices, 3, kGltfFloat, "VEC3", kVertices);
     Json primitives = Json::array();
     for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
       const std::uint64_t triangles = first_[m + 1] - first_[m];
       if (triangles == 0) continue;
       primitives.push_back({{"attributes", attributes},
-                            {"indices", add(3 * triangles, 1, kUnsignedInt, "SCALAR", kIndices)},
+                            {"indices", add(3 * triangles, 1, kGltfUint32, "SCALAR", kIndices)},
                             {"material", materials_.size()}});
       add_material(mesh.materials[m]);
     }
@@ -157,14 +158,14 @@ class GlbMesh {
   /// @param coloured  whether it is multiplied by the colours of the vertices, too
   void write(BufferedOutput& out, Spool<glm::vec3>& shown, float gain, bool coloured) const {
     const auto put32 = [&](std::uint64_t value) { put(out, static_cast<std::uint32_t>(value)); };
-    put32(kMagic);
+    put32(kGlbMagic);
     put32(2);
     put32(file_bytes());
     put32(json_.size());
-    put32(kJsonChunk);
+    put32(kGlbJson);
     out.put(json_.data(), json_.size());
     put32(bytes_);
-    put32(kBinChunk);
+    put32(kGlbBinary);
     for (const glm::vec3& position : mesh_.positions) put(out, position);
     for (const glm::vec3& normal : mesh_.normals) put(out, normal);
     for (const glm::vec2& uv : mesh_.uvs) put(out, glm::vec2(uv.x, 1 - uv.y));
@@ -181,8 +182,8 @@ class GlbMesh {
 
  private:
   /// Adds an accessor of elements that follow those before it.
-  std::size_t add(std::uint64_t count, std::uint64_t components, int type, const char* shape,
-                  int target) {
+  std::size_t add(std::uint64_t count, std::uint64_t components, std::uint64_t type,
+                  const char* shape, int target) {
     const std::uint64_t bytes = 4 * count * components;
     views_.push_back(
         {{"buffer", 0}, {"byteOffset", bytes_}, {"byteLength", bytes}, {"target", target}});
