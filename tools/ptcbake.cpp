@@ -22,8 +22,7 @@ namespace {
 constexpr char kPurpose[] =
     "Bakes occlusion, irradiance and bent normals into a texture or the vertices of a mesh.\n"
     "Each texel or vertex is shaded at its place on the surface, as ptcrender shades a pixel. For "
-    "a "
-    "texture the mesh needs texture coordinates that cover it without overlap.\n"
+    "a texture the mesh needs texture coordinates that cover it without overlap.\n"
     "\n"
     "An .exr holds the layers irradiance, direct, indirect, occlusion, bent_normal, albedo and "
     "alpha, and as picture the radiance that leaves the surface. A .png holds one of the layers. "
@@ -101,7 +100,6 @@ bool bakes_vertices(const Arguments& arguments) {
 ptc::Outcome bake(Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   ptc::RenderRequest& request = arguments.request;
   request.run = run;
-  request.vertices = bakes_vertices(arguments);
   if (!request.vertices) request.texture = arguments.texture;
   arguments.scene.apply(request, arguments.outputs.front(), progress);
   if (arguments.lights.given()) {
@@ -124,7 +122,8 @@ int main(int argc, char** argv) {
   ptc::add_back_end(command.app(), arguments.request.back_end);
   return command.run(argc, argv, [&](ptc::Progress& progress) {
     ptc::apply_preset(command.app(), preset, arguments.request);
-    if (bakes_vertices(arguments))
+    arguments.request.vertices = bakes_vertices(arguments);
+    if (arguments.request.vertices)
       ptc::note_unused(command.app(), {"--margin"}, "no texture is baked", progress);
     return bake(arguments, command.run_options(), progress);
   });
