@@ -246,3 +246,45 @@ TEST_CASE("sky density: a black map gives no light and no division by zero", "[s
   rig.sky.map = map_of(black(16, 8));
   CHECK(DirectLight(scene, rig).irradiance({0, 0, 0}, {0, 1, 0}, {}, 1).sky == glm::vec3(0));
 }
+
+TEST_CASE("sky: a smooth sky has the light of its map, and its places", "[scene][sky]") {
+  Random random(7);
+  const auto flux = [](const Texture& map) {
+    glm::dvec3 sum(0), moment(0);
+    const Image shape{map.width(), map.height(), {}};
+    const SkyOrientation orientation({0, 1, 0});
+    for (unsigned y = 0; y < map.height(); ++y) {
+      for (unsigned x = 0; x < map.width(); ++x) {
+        const glm::dvec3 light = glm::dvec3(map.at(x, y)) * pixel_sr(shape, y);
+        const glm::dvec2 place((x + 0.5) / map.width(), (y + 0.5) / map.height());
+        sum += light;
+        moment += light.x * glm::dvec3(orientation.direction_at(place));
+      }
+    }
+    return std::pair(sum, moment / sum.x);
+  };
+  // Sizes that are no multiples of one another, and a sun of one pixel
+  for (const auto& [width, height] : {std::pair(500U, 250U), std::pair(333U, 200U)}) {
+    Image image = noise(width, height, random);
+    set(image, width / 3, height / 4, glm::vec3(1e6F));
+    const Sky sharp{.radiance = glm::vec3(2), .map = map_of(image)};
+    const Sky smooth = smooth_sky(sharp, 128);
+    REQUIRE(smooth.map->width() == 128);
+    REQUIRE(smooth.map->height() == 64);
+    const auto [all, middle] = flux(*sharp.map);
+    const auto [kept, kept_middle] = flux(*smooth.map);
+    for (int c = 0; c < 3; ++c) CHECK(kept[c] == Approx(all[c]).epsilon(1e-5));
+    CHECK(glm::distance(middle, kept_middle) < 0.02);
+    CHECK(smooth.radiance == sharp.radiance);
+  }
+  // What is no wider stays
+  const Sky small{.radiance = glm::vec3(1), .map = map_of(noise(64, 32, random))};
+  CHECK(smooth_sky(small, 64).map == small.map);
+  CHECK(smooth_sky({.radiance = glm::vec3(1)}, 64).map == nullptr);
+  const Sky even{.radiance = glm::vec3(1),
+                 .map = map_of({300, 150, std::vector<glm::vec3>(300 * 150, glm::vec3(0.7F))})};
+  const Sky evened = smooth_sky(even, 128);
+  for (unsigned y = 0; y < 64; ++y) {
+    for (unsigned x = 0; x < 128; x += 9) CHECK(evened.map->at(x, y).g == Approx(0.7));
+  }
+}

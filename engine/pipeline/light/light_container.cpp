@@ -25,6 +25,7 @@
 #include "engine/pipeline/light/disc_light.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shading_channels.h"
+#include "engine/scene/light/sky_map.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/shader.h"
 #include "engine/store/attribute_rows.h"
@@ -232,7 +233,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   }
 
   // Divide the memory among as many threads as it allows, and collect what emits
-  const auto sky = sky_function(rig.sky);
+  const auto sky = sky_function(smooth_sky(rig.sky, 4 * request.gather.resolution));
   const bool by_rays = emitting > 0 || has_lamps(rig);
   const auto lights_with = [&](unsigned threads) {
     return threads * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));

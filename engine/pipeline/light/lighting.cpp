@@ -19,6 +19,7 @@
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/bounces.h"
+#include "engine/scene/light/sky_map.h"
 #include "engine/trace/disc_visibility.h"
 
 namespace ptc {
@@ -156,7 +157,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
   }
   options_ = {.back_end = request_.back_end,
               .gather = request_.gather,
-              .sky = sky_function(sky),
+              .sky = sky_function(smooth_sky(sky, 4 * request_.gather.resolution)),
               .visibility = disc_visibility(request_.gather.sides),
               .lost = lost_.get(),
               .variants = variants};
@@ -168,6 +169,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
     around.diagonals = 0;
   }
   has_sky_map_ = sky.map != nullptr;
+  mirrored_sky_ = sky_function(sky);
   // Without light on any surface there is none to gather
   const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
   options_.gather.bleeding = request_.bounces > 0 && is_lit;
@@ -220,6 +222,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
   // Start the sample for check(), without the pilots, and the gather or the rays
   sample_.emplace(request_.check, std::move(compared));
   RayOptions with = ray_options(options_);
+  with.sky = mirrored_sky_;
   if (receiver_rays() > 0) {
     with.memory_bytes += mirror_bytes_;
   } else {
@@ -299,8 +302,9 @@ void Lighting::check(const CheckScene& seen) {
   if (request_.check.receivers == 0) return;
   const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
   const Stage stage(report_.seconds, progress_, "check", references, "references");
-  report_.check =
-      sample_->compare(lit(), ray_options(options_), mirrors_, seen, executor_, progress_);
+  RayOptions with = ray_options(options_);
+  with.sky = mirrored_sky_;
+  report_.check = sample_->compare(lit(), with, mirrors_, seen, executor_, progress_);
 }
 
 }  // namespace ptc

@@ -205,6 +205,7 @@ class Lighting {
   std::unique_ptr<ContainerReader> bounced_;
   ShadeOptions options_;
   bool has_sky_map_ = false;
+  std::function<glm::vec3(const glm::vec3&)> mirrored_sky_;  ///< the sky that mirrors show
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
   std::unique_ptr<RayShader> rays_;  ///< null where the gather shades, and nothing is reflected

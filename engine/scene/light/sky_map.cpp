@@ -21,6 +21,8 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <memory>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -194,6 +196,42 @@ float SkyDensity::density(const glm::vec3& direction) const {
 std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {
   if (sky.radiance == glm::vec3(0)) return {};
   return [sky](const glm::vec3& direction) { return sky.at(direction); };
+}
+
+Sky smooth_sky(const Sky& sky, unsigned width) {
+  if (!has_map(sky) || sky.map->width() <= width) return sky;
+  const unsigned height = std::min(width / 2, sky.map->height());
+  const double columns = static_cast<double>(width) / sky.map->width();
+  const double rows = static_cast<double>(height) / sky.map->height();
+  std::vector<glm::dvec3> sums(std::size_t{width} * height), line(width);
+  unsigned from = 0;  // row of the map
+  sky.map->visit_rows([&](std::span<const glm::vec3> pixels) {
+    // A pixel reaches into one or two new columns, and as many rows
+    std::ranges::fill(line, glm::dvec3(0));
+    for (std::size_t x = 0; x < pixels.size(); ++x) {
+      const double begin = static_cast<double>(x) * columns, end = begin + columns;
+      const auto first = static_cast<unsigned>(begin), next = std::min(first + 1, width - 1);
+      const double beyond = std::max(0.0, end - (first + 1.0));
+      line[first] += (columns - beyond) * glm::dvec3(pixels[x]);
+      line[next] += beyond * glm::dvec3(pixels[x]);
+    }
+    const double top = from++ * rows, bottom = top + rows;
+    for (auto y = static_cast<unsigned>(top); y < height && y < bottom; ++y) {
+      // The share of the row's solid angle
+      const double share = std::cos(std::max<double>(top, y) * kPiDouble / height) -
+                           std::cos(std::min<double>(bottom, y + 1.0) * kPiDouble / height);
+      for (unsigned x = 0; x < width; ++x) sums[std::size_t{y} * width + x] += share * line[x];
+    }
+  });
+  Image image{.width = width, .height = height};
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const double y = static_cast<double>(i / width);
+    const double whole = std::cos(y * kPiDouble / height) - std::cos((y + 1) * kPiDouble / height);
+    image.pixels.emplace_back(sums[i] / whole);
+  }
+  Sky smooth = sky;
+  smooth.map = std::make_shared<const Texture>(std::move(image));
+  return smooth;
 }
 
 }  // namespace ptc

@@ -86,4 +86,12 @@ class SkyDensity {
   std::vector<float> blocks_;  ///< within each row, the share up to and including each block
 };
 
+/// Returns a sky whose map has no more columns than a gather can tell apart: each pixel is the mean
+/// of the map over its solid angle, so that small bright spots such as the sun keep their light
+/// where a direction pixel is larger than they are.
+/// @param width  greatest number of columns, even
+/// @return  the sky itself where its map is no wider, or where it has none
+/// Time: that of reading the map once.   Memory: 32 bytes for each pixel of the new map.
+[[nodiscard]] Sky smooth_sky(const Sky& sky, unsigned width);
+
 }  // namespace ptc
