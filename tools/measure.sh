@@ -102,6 +102,7 @@ measure sort sort --points 4M --points 20M --memory 1G -- --points 20k "${once[@
 measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
   --points 20k --panel disk --order city "${once[@]}"
 measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
+measure stability stability -- --row 3 --row 12
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
 [[ -n $list || -n $known ]] || usage "there is no result '$only'. --list prints the names"

@@ -99,27 +99,6 @@ TEST_CASE("direction buffer: surroundings weigh directions and distances by thei
   }
 }
 
-TEST_CASE("direction buffer: small discs cover their solid angle in every direction",
-          "[shade][buffer]") {
-  std::mt19937 bits(3);
-  std::uniform_real_distribution<float> uniform;
-  double ratio_sum = 0;
-  for (int i = 0; i < 1000; ++i) {
-    const glm::vec3 direction = random_direction(bits);
-    const float distance = std::exp(6 * uniform(bits) - 3);
-    const float solid_angle = 0.02F;
-    DirectionBuffer buffer(64);
-    draw_disc(fine_grid(), buffer, direction * distance, -direction,
-              std::sqrt(solid_angle / kPi) * distance, 1, Sides::front);
-    const double covered =
-        static_cast<double>(buffer.resolve(fine_grid(), direction).occlusion * kPi / solid_angle);
-    CHECK(covered > 0.6);  // one pixel row more or less of about ten
-    CHECK(covered < 1.4);
-    ratio_sum += covered;
-  }
-  CHECK(ratio_sum / 1000 == Approx(1).margin(0.02));
-}
-
 TEST_CASE("direction buffer: a disc over the receiver has the analytic form factor",
           "[shade][buffer]") {
   std::mt19937 bits(4);
@@ -209,25 +188,6 @@ TEST_CASE(
     CHECK(s.irradiance.g < 0.1F);
     CHECK(s.irradiance.b < 0.01F);
   }
-}
-
-TEST_CASE("direction buffer: an emitter moving across pixels changes the light smoothly",
-          "[shade][buffer]") {
-  const std::uint32_t white = encode_rgbe({1, 1, 1});
-  const DirectionGrid grid(32, {});
-  float last = -1, largest = 0, least = 1e9F;
-  for (int i = 0; i <= 400; ++i) {
-    const float angle = 0.5F + 0.3F * static_cast<float>(i) / 400;
-    DirectionBuffer buffer(32);
-    draw_disc(grid, buffer, 10.0F * glm::vec3(std::sin(angle), 0, std::cos(angle)),
-              -glm::vec3(std::sin(angle), 0, std::cos(angle)), 2, white, Sides::front);
-    const float e = buffer.resolve(grid, {0, 0, 1}).irradiance.r / std::cos(angle);
-    if (last >= 0) largest = std::max(largest, std::abs(e - last));
-    last = e;
-    least = std::min(least, e);
-  }
-  CHECK(least == Approx(kPi * 0.04 / 1.04).epsilon(0.1));  // about 36 pixels
-  CHECK(largest < 0.08F * least);                          // at most two or three at once
 }
 
 TEST_CASE("direction buffer: discs drawn from elsewhere move with the receiver, to first order",

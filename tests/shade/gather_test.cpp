@@ -41,29 +41,6 @@ glm::dmat3 tilted() {
 
 }  // namespace
 
-TEST_CASE("gather: a lone plane has no occlusion, at any tilt and at any scale",
-          "[shade][gather]") {
-  for (const double scale : {1e-3, 1.0, 1e4}) {
-    for (int turn = 0; turn < 4; ++turn) {
-      const double a = 0.7 * turn;
-      const glm::dvec3 u(std::cos(a), std::sin(a), 0.3 * turn),
-          v = glm::cross(glm::dvec3(0.1, 0.2, 1), u);
-      std::vector<Surfel> surfels;
-      add_rectangle(surfels, {0, 0, 0}, u * scale, glm::normalize(v) * scale, 0.02 * scale,
-                    glm::vec3(1));
-      Scene scene(surfels);
-      for (std::size_t i = 0; i < surfels.size(); i += 23) {  // at rims, in corners and inside
-        const Surfel& s = surfels[i];
-        scene.receivers.push_back(
-            {s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
-      }
-      float worst = 0;
-      for (const Shading& s : scene.shade()) worst = std::max(worst, s.occlusion);
-      CHECK(worst <= 0.002F);
-    }
-  }
-}
-
 TEST_CASE("gather: a floor next to a wall gets the analytic form factor up to the crease",
           "[shade][gather]") {
   constexpr double kSpacing = 0.02;

@@ -18,12 +18,14 @@ set(PTC_LAYERS_engine/pipeline
   "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/scene;engine/sort;engine/scan;engine/store;engine/octree;engine/cache;engine/shade;engine/trace")
 set(PTC_LAYERS_engine "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine/verify")
 set(PTC_LAYERS_tools/bench/chart "format;engine/base;engine/io/file;engine/io")
+set(PTC_LAYERS_tools/bench/shapes "format;engine/base;engine/parallel;engine/io/file;engine/io;engine/sort;engine/store;engine/octree")
 set(PTC_LAYERS_tools "${PTC_LAYERS_engine/pipeline};engine/verify;engine/pipeline;engine;tools/bench/chart")
 set(PTC_LAYERS_tools/bench/report "format;engine/base;engine/io/file;engine/io;tools/bench/chart")
 set(PTC_LAYERS_tools/bench/scenes "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine")
 set(PTC_LAYERS_tools/bench/references "${PTC_LAYERS_tools/bench/scenes};tools/bench/chart;tools/bench/scenes")
+set(PTC_LAYERS_tools/bench/stability "${PTC_LAYERS_tools/bench/references};tools/bench/references;tools/bench/shapes")
 set(PTC_LAYERS_tools/bench/experiments
-  "${PTC_LAYERS_tools};tools;tools/bench/report;tools/bench/scenes;tools/bench/references")
+  "${PTC_LAYERS_tools};tools;tools/bench/report;tools/bench/scenes;tools/bench/references;tools/bench/shapes;tools/bench/stability")
 set(PTC_LAYERS_tools/bench "${PTC_LAYERS_tools/bench/experiments};tools/bench/experiments")
 
 add_library(ptc_options INTERFACE)

@@ -23,9 +23,9 @@
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/bench_run.h"
 #include "tools/bench/experiments/stored_bytes.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

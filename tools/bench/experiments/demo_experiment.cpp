@@ -14,8 +14,8 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/verify/verify.h"
 #include "tools/bench/experiments/experiment.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -8,7 +8,7 @@
 #include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
 #include "format/point_page.h"
-#include "tools/bench/experiments/work_file.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -24,8 +24,8 @@
 #include "engine/scene/procedural/city.h"
 #include "engine/sort/external_sort.h"
 #include "tools/bench/experiments/rival_run.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -32,7 +32,7 @@
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/mutations.h"
 #include "tools/bench/experiments/two_parts.h"
-#include "tools/bench/experiments/work_file.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -24,8 +24,8 @@
 #include "engine/scene/ray_scene.h"
 #include "engine/shade/reference/cosine_rays.h"
 #include "engine/store/container_points.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

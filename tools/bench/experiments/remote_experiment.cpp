@@ -8,7 +8,7 @@
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/growth.h"
 #include "tools/bench/experiments/remote.h"
-#include "tools/bench/experiments/work_file.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

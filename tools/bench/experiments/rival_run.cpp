@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/report/report.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 

@@ -18,14 +18,12 @@
 #include "engine/pipeline/scene_record.h"
 #include "engine/scene/procedural/city.h"
 #include "tools/bench/chart/flip.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/report/sheet.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {
-
-constexpr float kFlipWhite = 0.25F;  // difference that a sheet shows as white
-constexpr unsigned kGap = 4;         // pixels between the pictures of a sheet
 
 Image image_of(const PathPicture& paths, unsigned width, unsigned height) {
   Image image{width, height, {}};
@@ -48,35 +46,6 @@ float exposure_of(const Image& image) {
 Image scaled(Image image, float factor) {
   for (glm::vec3& pixel : image.pixels) pixel *= factor;
   return image;
-}
-
-/// Returns differences as colours from black over red and yellow to white, linear RGB.
-Image map_of(const std::vector<float>& errors, unsigned width, unsigned height) {
-  Image image{width, height, {}};
-  for (const float error : errors) {
-    const float t = 3 * std::min(error / kFlipWhite, 1.0F);
-    glm::vec3 colour(0);
-    for (int c = 0; c < 3; ++c)
-      colour[c] = std::pow(std::clamp(t - static_cast<float>(c), 0.0F, 1.0F), 2.2F);
-    image.pixels.push_back(colour);
-  }
-  return image;
-}
-
-/// Returns pictures of one size side by side on white.
-Image side_by_side(const std::vector<Image>& images) {
-  const unsigned width = images.front().width, height = images.front().height;
-  const auto count = static_cast<unsigned>(images.size());
-  Image sheet{count * width + (count - 1) * kGap, height, {}};
-  sheet.pixels.assign(std::size_t{sheet.width} * height, glm::vec3(1));
-  for (unsigned i = 0; i < count; ++i) {
-    for (unsigned y = 0; y < height; ++y) {
-      const auto row = images[i].pixels.begin() + std::ptrdiff_t{y} * width;
-      std::copy(row, row + width,
-                sheet.pixels.begin() + std::ptrdiff_t{y} * sheet.width + i * (width + kGap));
-    }
-  }
-  return sheet;
 }
 
 /// Writes both pictures and the map of their differences as layers of one file.
@@ -190,7 +159,7 @@ Room measure_room(const SceneChoice& choice, const RoomsOptions& options,
   const Image shown = scaled(ours, exposure), shown_truth = scaled(truth, exposure);
   const std::vector<float> errors = hdr_flip(ours, truth);
   Room room{.row = compare_room(ours, paths),
-            .sheet = side_by_side({shown, shown_truth, map_of(errors, width, height)})};
+            .sheet = side_by_side({shown, shown_truth, flip_map(errors, width, height)})};
   RoomRow& row = room.row;
   row.scene = choice.name;
   row.triangles = scene.mesh.triangles.size();

@@ -21,9 +21,9 @@
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/scale_answers.h"
 #include "tools/bench/experiments/stored_bytes.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/record_file.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -25,9 +25,9 @@
 #include "format/checksum.h"
 #include "format/scalar.h"
 #include "tools/bench/experiments/rival_run.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/sampled_cloud.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

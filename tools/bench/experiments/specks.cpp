@@ -21,9 +21,9 @@
 #include "engine/pipeline/convert/container_source.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/scene/mesh_reference.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/sampled_cloud.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {

@@ -12,8 +12,8 @@
 #include "tools/bench/experiments/disk_reads.h"
 #include "tools/bench/experiments/experiment.h"
 #include "tools/bench/experiments/growth.h"
-#include "tools/bench/experiments/work_file.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {
