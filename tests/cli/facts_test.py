@@ -299,7 +299,11 @@ class Facts(ProgramTest):
             self.fail("no error between the floor and what is confirmed was found")
         told = self.succeed(*command, factor * floor).stdout
         self.assertIn("% asked cannot be confirmed: the finest setting (", told)
-        self.assertIn(f") has {100 * tuning['measured']['relative']:.2f} % at {tuning['pilots']} pilot receivers, but ", told)
+        measured = tuning["measured"]["relative"]
+        self.assertLess(tuning["low"], measured)
+        self.assertGreater(tuning["high"], measured)
+        bounds = f"[{100 * tuning['low']:.2f}, {100 * tuning['high']:.2f}]"
+        self.assertIn(f") has {100 * measured:.2f} % {bounds} at {tuning['pilots']} pilot receivers, but ", told)
         self.assertNotIn("floor", told)
 
     def test_estimates_are_written_and_what_they_are_worth_is_told(self):

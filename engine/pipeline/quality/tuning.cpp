@@ -36,10 +36,10 @@ constexpr std::array kLadder{
     Rung{0.001F, 0.03F, 64, 0.010},
 };
 
-// Number of resamples of the pilots, and the sorted one whose error is the bound: the errors of 19
-// in 20 resamples are below it
+// Number of resamples of the pilots, and the sorted ones whose errors are the bounds: the errors of
+// 19 in 20 resamples are below the upper one, and of 19 in 20 above the lower one
 constexpr unsigned kResamples = 200;
-constexpr unsigned kBelow = 190;
+constexpr unsigned kHigh = 190, kLow = kResamples - 1 - kHigh;
 
 // The rays of a result form a square. Its side in the first attempt, its maximum, and the noise of
 // one result over the error that is asked for, above which a second attempt is made
@@ -62,6 +62,12 @@ constexpr unsigned kRayStep = 32;
 constexpr unsigned kMostRays = 1U << 17;
 // Seed of results by rays, far from those that they are compared with
 constexpr std::uint64_t kOwnSeed = std::uint64_t{1} << 32;
+
+/// An error at some pilots, and its bounds (TuningReport::low).
+struct Measured {
+  CheckError error;
+  double low = 0, high = 0;
+};
 
 /// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure(), and
 /// at the end choose_rays().
@@ -141,22 +147,19 @@ class Tuner {
   }
 
   /// Returns the error of the rays that choose_rays() found at the confirming pilots.
-  [[nodiscard]] CheckError measure_rays() const {
-    ErrorSums sums;
-    for (const ErrorSums& pilot : own_errors(pilots_.size() < 2 ? kChoosing : kConfirming))
-      sums.add(pilot);
-    return sums.error();
+  [[nodiscard]] Measured measure_rays() const {
+    return measured(own_errors(pilots_.size() < 2 ? kChoosing : kConfirming));
   }
 
   /// Returns the error of a rung at the confirming pilots.
   /// @param all  at the choosing pilots, too
-  CheckError measure(std::size_t rung, bool all) {
-    ErrorSums sums;
-    for (const std::size_t part : {kChoosing, kConfirming}) {
-      if (!all && part == kChoosing) continue;
-      for (const ErrorSums& pilot : errors_of(rung, part)) sums.add(pilot);
+  Measured measure(std::size_t rung, bool all) {
+    std::vector<ErrorSums> errors = errors_of(rung, kConfirming);
+    if (all) {
+      const std::vector<ErrorSums>& others = errors_of(rung, kChoosing);
+      errors.insert(errors.begin(), others.begin(), others.end());
     }
-    return sums.error();
+    return measured(errors);
   }
 
   [[nodiscard]] std::uint64_t shaded() const { return shaded_; }
@@ -201,19 +204,31 @@ class Tuner {
     return static_cast<std::size_t>(found - ladder().begin());
   }
 
-  /// Returns an upper bound on the error of the run, at a confidence of 95 %: a quantile over
-  /// resamples of the pilots with replacement (Efron 1979).
-  [[nodiscard]] static double bound(const std::vector<ErrorSums>& errors) {
-    if (errors.empty()) return 0;
-    std::mt19937_64 bits;  // with its default seed, so that the bound is the same each time
+  /// Returns the errors of resamples of the pilots with replacement, ascending (Efron 1979).
+  [[nodiscard]] static std::vector<double> resampled(const std::vector<ErrorSums>& errors) {
+    std::mt19937_64 bits;  // with its default seed, so that the errors are the same each time
     std::vector<double> samples(kResamples);
     for (double& sample : samples) {
       ErrorSums sums;
       for (std::size_t i = 0; i < errors.size(); ++i) sums.add(errors[bits() % errors.size()]);
       sample = sums.error().relative();
     }
-    std::ranges::nth_element(samples, samples.begin() + kBelow);
-    return samples[kBelow];
+    std::ranges::sort(samples);
+    return samples;
+  }
+
+  /// Returns an upper bound on the error of the run, at a confidence of 95 %.
+  [[nodiscard]] static double bound(const std::vector<ErrorSums>& errors) {
+    return errors.empty() ? 0 : resampled(errors)[kHigh];
+  }
+
+  /// Returns the error of all these pilots, with its bounds.
+  [[nodiscard]] static Measured measured(const std::vector<ErrorSums>& errors) {
+    if (errors.empty()) return {};
+    ErrorSums sums;
+    for (const ErrorSums& pilot : errors) sums.add(pilot);
+    const std::vector<double> samples = resampled(errors);
+    return {sums.error(), samples[kLow], samples[kHigh]};
   }
 
   /// Returns the errors of each pilot of a part at a rung, shaded at the first call.
@@ -335,11 +350,16 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
                       .gather = ladder()[rung].options(options.gather),
                       .setting = static_cast<unsigned>(rung),
                       .settings = static_cast<unsigned>(ladder().size()),
-                      .measured = tuner.measure(rung, !met || pilots.size() < 2),
                       .pilots = tuner.compared().size(),
                       .rays = 2 * rays,
-                      .shaded = tuner.shaded(),
                       .ray_cpu_seconds = tracing_done - before};
+  const auto tell = [&](const Measured& measured) {
+    report.measured = measured.error;
+    report.low = measured.low;
+    report.high = measured.high;
+  };
+  tell(tuner.measure(rung, !met || pilots.size() < 2));
+  report.shaded = tuner.shaded();
   report.shade_cpu_seconds = cpu_seconds() - tracing_done;
 
   // See whether rays cost less
@@ -348,7 +368,7 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
     report.receiver_rays = tuner.choose_rays(asked, rung, rays, progress);
     if (report.receiver_rays > 0) {
       report.met = true;
-      report.measured = tuner.measure_rays();
+      tell(tuner.measure_rays());
     }
     report.ray_cpu_seconds += cpu_seconds() - before_rays;
   }
@@ -369,7 +389,7 @@ std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& o
   for (std::size_t rung = 0; rung < ladder().size(); ++rung) {
     const std::uint64_t shaded = tuner.shaded();
     const double before = cpu_seconds();
-    const CheckError error = tuner.measure(rung, true);
+    const CheckError error = tuner.measure(rung, true).error;
     const auto count = static_cast<double>(std::max<std::uint64_t>(1, tuner.shaded() - shaded));
     rungs.push_back({error, (cpu_seconds() - before) * 1e6 / count});
   }

@@ -53,6 +53,9 @@ struct TuningReport {
   /// Error of the setting or of the rays at the pilots that did not choose; at all pilots when
   /// `met` is false or there is only one pilot.
   CheckError measured;
+  /// Bounds of `measured` as CheckError::relative(), at a confidence of 90 %: one in 20 resamples
+  /// of those pilots has a lower error than `low`, and one in 20 a higher one than `high`.
+  double low = 0, high = 0;
   std::size_t pilots = 0;      ///< number of receivers compared with rays
   unsigned rays = 0;           ///< rays for each of these receivers that results are compared with
   std::uint64_t shaded = 0;    ///< receivers that were shaded, over all settings that were tried
