@@ -9,7 +9,6 @@
 #include <limits>
 #include <numbers>
 
-#include "engine/base/numbers.h"
 #include "engine/io/image/srgb.h"
 
 namespace ptc {
@@ -34,12 +33,23 @@ glm::vec3 colour_of_normal(const glm::vec3& normal) {
   return normal == glm::vec3(0) ? glm::vec3(0) : stored_as(0.5F * normal + 0.5F);
 }
 
-/// Returns a colour for a number, black for 0.
+/// Returns a colour for a number, black for 0. Multiples of the golden ratio spread the hues of
+/// numbers that follow one another, those of the plastic number saturation and brightness.
 glm::vec3 colour_of_id(float id) {
   if (id == 0) return glm::vec3(0);
-  const std::uint64_t bits = splitmix64(static_cast<std::uint64_t>(id));
-  const auto part = [bits](int at) { return static_cast<float>(bits >> at & 0xff) / 255; };
-  return stored_as(0.2F + 0.8F * glm::vec3(part(0), part(8), part(16)));
+  const auto turn = [id](double step) {
+    const double turns = step * static_cast<double>(id);
+    return static_cast<float>(turns - std::floor(turns));
+  };
+  const float hue = 6 * turn(0.6180339887498949),
+              saturation = 0.5F + 0.4F * turn(0.7548776662466927),
+              value = 0.95F - 0.35F * turn(0.5698402909980532);
+  glm::vec3 colour;
+  for (int c = 0; c < 3; ++c) {
+    const float away = std::fmod(hue + static_cast<float>(5 - 2 * c), 6.0F);
+    colour[c] = value * (1 - saturation * std::clamp(std::min(away, 4 - away), 0.0F, 1.0F));
+  }
+  return stored_as(colour);
 }
 
 }  // namespace
