@@ -24,13 +24,15 @@ constexpr char kPurpose[] =
     "Each texel or vertex is shaded at its place on the surface, as ptcrender shades a pixel. For "
     "a texture the mesh needs texture coordinates that cover it without overlap.\n"
     "\n"
-    "An .exr holds the layers irradiance, direct, indirect, occlusion, bent_normal, albedo and "
-    "alpha, and as picture the radiance that leaves the surface. A .png holds one of the layers. "
-    "Texels next to an island show its edge; alpha leaves them out. With <UDIM> in the name of "
-    "the output there is a file for each tile of the texture coordinates: 1001, 1002 and so on.\n"
+    "An .exr holds the layers irradiance, direct, indirect, occlusion, bent_normal, albedo, "
+    "object_id and material_id, and as picture the radiance that leaves the surface. A .png holds "
+    "one of the layers. Texels next to an island show its edge; alpha leaves them out. With <UDIM> "
+    "in the name of the output there is a file for each tile of the texture coordinates: 1001, "
+    "1002 and so on.\n"
     "\n"
-    "A .ply holds the mesh with all of these at its vertices, and with colours as a picture has "
-    "them. A .glb holds the mesh with COLOR_0: the light by which the base colour is multiplied.";
+    "A .ply holds the mesh with all of these but the numbers of objects and materials at its "
+    "vertices, and with colours as a picture has them. A .glb holds the mesh with COLOR_0: the "
+    "light by which the base colour is multiplied.";
 constexpr char kExamples[] =
     "  # Bake the light of a room, and its occlusion as a PNG\n"
     "  ptcbake room.obj -o room.exr --layer occlusion=ao.png\n"
@@ -42,8 +44,8 @@ constexpr char kExamples[] =
     "  ptcbake character.obj --sky sunset.exr -o 'light.<UDIM>.exr'\n";
 
 /// The layers that a .png may show, without the picture itself.
-constexpr std::array<std::string_view, 5> kLayers{"irradiance", "direct", "indirect", "occlusion",
-                                                  "albedo"};
+constexpr std::array<std::string_view, 7> kLayers{
+    "irradiance", "direct", "indirect", "occlusion", "albedo", "object_id", "material_id"};
 
 /// The request, and the arguments that are turned into it after parsing.
 struct Arguments {

@@ -27,10 +27,11 @@ constexpr char kPurpose[] =
     "Direct light comes by shadow rays from the lights and the sky; indirect light is gathered "
     "from the surfels. Of clouds and meshes a container is built first, in a temporary file.\n"
     "\n"
-    "An .exr holds the picture in linear light, in W/m^2/sr, and the layers direct, indirect, "
-    "occlusion, bent_normal, albedo and alpha. With --estimate it also holds occlusion_error and "
-    "irradiance_error, with --glossy reflection and reflection_occlusion. A .png holds the picture "
-    "or one of the layers direct, indirect, occlusion, albedo and reflection, for display.";
+    "An .exr holds the picture in linear light, in W/m^2/sr, with alpha and depth (Z), and the "
+    "layers direct, indirect, occlusion, bent_normal, albedo, position (P) and normal (N). Of "
+    "meshes it also holds object_id and material_id, whose names are in its header; with "
+    "--estimate occlusion_error and irradiance_error, with --glossy reflection and "
+    "reflection_occlusion. A .png holds the picture or one of its layers, for display.";
 constexpr char kExamples[] =
     "  # Render a mesh with the light of its container\n"
     "  ptcrender dragon.ptcx --mesh dragon.ply --backdrop -o dragon.png\n"
@@ -41,6 +42,8 @@ constexpr char kExamples[] =
     "  ptcrender room.ptcx --camera 0,1.6,4,0,1.2,0 --fov 50 --size 1920x1080 -o room.exr\n"
     "  # Write the picture, and its occlusion as a picture of its own\n"
     "  ptcrender room.ptcx -o room.png --layer occlusion=occlusion.png\n"
+    "  # Write the numbers of objects and materials, and a picture of the objects\n"
+    "  ptcrender room.obj chair.glb -o room.exr --layer object_id=objects.png\n"
     "  # Render what the surfaces would reflect if they were rough mirrors, too\n"
     "  ptcrender room.ptcx --glossy 0.3 -o room.exr --layer reflection=reflection.png\n"
     "  # Go once around what is seen, in 48 pictures\n"
@@ -62,8 +65,9 @@ struct Arguments {
 };
 
 /// The layers that a .png may show, without the picture itself.
-constexpr std::array<std::string_view, 5> kLayers{"direct", "indirect", "occlusion", "albedo",
-                                                  "reflection"};
+constexpr std::array<std::string_view, 9> kLayers{"direct", "indirect",   "occlusion",
+                                                  "albedo", "reflection", "depth",
+                                                  "normal", "object_id",  "material_id"};
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
   ptc::RenderRequest& request = arguments.request;

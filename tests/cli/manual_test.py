@@ -198,7 +198,7 @@ class Completions(unittest.TestCase):
         self.assertEqual(complete("ptcbuild", "--profile", "=", "c"), ["compact"])
         self.assertEqual(complete("ptcbuild", "--profile", "="), words)
         self.assertEqual(complete("ptcbuild", "--page-size", "1"), ["16K", "128K", "1M"])
-        self.assertEqual(complete("ptcrender", "--layer", "o"), ["occlusion="])
+        self.assertEqual(complete("ptcrender", "--layer", "oc"), ["occlusion="])
         self.assertEqual(complete("ptcbuild", "--points", ""), [])
 
     def test_bash_proposes_files_with_endings_that_fit_and_directories(self):

@@ -45,13 +45,13 @@ void add_square(Mesh& mesh, float height, const glm::vec2& low, const glm::vec2&
   mesh.materials[0].albedo = glm::vec3(1);
 }
 
-// Reads a layer of one component.
-std::vector<float> read_scalar(const std::filesystem::path& path, const std::string& layer) {
+// Reads a channel.
+std::vector<float> read_channel(const std::filesystem::path& path, const std::string& channel) {
   Imf::InputFile file(path.c_str());
   std::vector<float> values(std::size_t{kSide} * kSide, -1);
   Imf::FrameBuffer frame;
-  frame.insert(layer + ".V", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()),
-                                        sizeof(float), sizeof(float) * kSide));
+  frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()),
+                                   sizeof(float), sizeof(float) * kSide));
   file.setFrameBuffer(frame);
   file.readPixels(0, kSide - 1);
   return values;
@@ -134,8 +134,8 @@ TEST_CASE("bake: a texel is the place that the texture coordinates say, row 0 wh
   bake.run();
   const auto albedo = test::read_layer(bake.path("a.exr"), "albedo"),
              irradiance = test::read_layer(bake.path("a.exr"), "irradiance");
-  const auto occlusion = read_scalar(bake.path("a.exr"), "occlusion"),
-             alpha = read_scalar(bake.path("a.exr"), "alpha");
+  const auto occlusion = read_channel(bake.path("a.exr"), "occlusion.V"),
+             alpha = read_channel(bake.path("a.exr"), "A");
   for (unsigned y = 0; y < kSide; ++y) {
     for (unsigned x = 0; x < kSide; ++x) {
       const std::size_t at = y * kSide + x;
@@ -159,7 +159,7 @@ TEST_CASE("bake: a margin shows the edge of its island, and alpha leaves it out"
   bake.run();
   const auto albedo = test::read_layer(bake.path("a.exr"), "albedo"),
              picture = test::read_layer(bake.path("a.exr"), "");
-  const auto alpha = read_scalar(bake.path("a.exr"), "alpha");
+  const auto alpha = read_channel(bake.path("a.exr"), "A");
   const std::size_t row = kSide / 2 * kSide;
   for (unsigned x = 0; x < kSide; ++x) {
     const bool inside = x >= 8 && x < 24, margin = !inside && x >= 4 && x < 28;

@@ -105,7 +105,7 @@ TEST_CASE("display: a .png is not flat white unless that is asked for", "[integr
   std::vector<ExrLayerType> types;
   for (const Film::Layer& layer : film.layers()) types.push_back(layer.type);
   const auto write = [&](std::optional<Display> display) {
-    PictureFiles files(targets, ImageWindow::whole(100, 100), types, display, scratch.path());
+    PictureFiles files(targets, ImageWindow::whole(100, 100), types, {}, display, scratch.path());
     files.write(film);
     const std::optional<Display> chosen = files.publish();
     CHECK(chosen.has_value() == !display.has_value());

@@ -340,7 +340,7 @@ TEST_CASE("pipeline: a request that is out of range is refused with the name of 
   CHECK(render([](RenderRequest& r) { r.size = {{65537, 1}}; }, {{dir / "o.png"}}) == "size");
   CHECK(render([](RenderRequest&) {}, {{dir / "o.jpg"}}) == "targets");
   CHECK(render([](RenderRequest&) {}, {}) == "targets");
-  CHECK(render([](RenderRequest&) {}, {{dir / "o.png", "depth"}}) == "targets");
+  CHECK(render([](RenderRequest&) {}, {{dir / "o.png", "motion"}}) == "targets");
   CHECK(render([&](RenderRequest& r) { r.lights = dark(glm::vec3(0)); }, {{dir / "o.png"}}) ==
         "lights");
   CHECK(render([](RenderRequest& r) { r.camera = Camera{.position = glm::dvec3(NAN)}; },

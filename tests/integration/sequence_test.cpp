@@ -383,9 +383,10 @@ TEST_CASE("sequence: animations of glTF are seen at the times of frames",
         {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}])" +
                                     animations + "}");
   };
-  const auto moving = file("moving.gltf", "", R"(, "animations": [{
+  const std::string animations = R"(, "animations": [{
       "samplers": [{"input": 1, "output": 2}],
-      "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}])");
+      "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}])";
+  const auto moving = file("moving.gltf", "", animations);
   scene.request.camera.reset();
   scene.request.camera_name = "shot";
   scene.request.meshes.clear();
@@ -395,15 +396,16 @@ TEST_CASE("sequence: animations of glTF are seen at the times of frames",
   scene.request.sequence = SequenceRequest{.frames = {0, 40, 10}, .frames_per_second = 20};
   scene.render({"all.##.exr"});
   scene.request.sequence.reset();
-  for (const int frame : {0, 10, 20, 30, 40}) {
+  for (const int frame : {0, 10, 20, 30, 40}) {  // under the same name, which is in the header
     scene.request.scene =
-        file("still.gltf", R"(, "translation": [0, )" + std::to_string(frame / 40.0) + ", 0]", "");
+        file("moving.gltf", R"(, "translation": [0, )" + std::to_string(frame / 40.0) + ", 0]", "");
     scene.render({"still.exr"});
     INFO("frame " << frame);
     CHECK(same_bytes(scene.path("still.exr"), *frame_name(scene.path("all.##.exr"), frame)));
   }
 
   // A container stands still, which is told
+  file("moving.gltf", "", animations);
   BuildRequest build{.inputs = {moving}};
   build.sampling.count = 500;
   build_container(build, scene.path("b.ptcx"), scene.notes);

@@ -66,14 +66,14 @@ ShadeRequest shadows(const std::filesystem::path& of, std::vector<std::string> g
   return request;
 }
 
-std::vector<float> read_scalar(const std::filesystem::path& path, const std::string& layer) {
+std::vector<float> read_channel(const std::filesystem::path& path, const std::string& channel) {
   Imf::InputFile file(path.c_str());
   const auto window = file.header().dataWindow();
   const auto width = static_cast<std::size_t>(window.max.x + 1);
   std::vector<float> pixels(width * static_cast<std::size_t>(window.max.y + 1), -1);
   Imf::FrameBuffer frame;
-  frame.insert(layer + ".V", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(pixels.data()),
-                                        sizeof(float), sizeof(float) * width));
+  frame.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(pixels.data()),
+                                   sizeof(float), sizeof(float) * width));
   file.setFrameBuffer(frame);
   file.readPixels(0, window.max.y);
   return pixels;
@@ -166,8 +166,8 @@ TEST_CASE("shadow: pictures have one as a layer, of meshes and of points",
   request.samples = 1;
   const std::vector<PictureTarget> target{{dir / "picture.exr"}};
   render_picture(request, target, silent);
-  const std::vector<float> shadow = read_scalar(dir / "picture.exr", "shadow_key"),
-                           alpha = read_scalar(dir / "picture.exr", "alpha");
+  const std::vector<float> shadow = read_channel(dir / "picture.exr", "shadow_key.V"),
+                           alpha = read_channel(dir / "picture.exr", "A");
   int dark = 0, bright = 0;
   for (unsigned y = 0; y < 60; ++y) {
     for (unsigned x = 0; x < 80; ++x) {

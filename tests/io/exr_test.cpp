@@ -12,6 +12,7 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
 #include <ImfTiledOutputFile.h>
 #include <catch2/catch.hpp>
 #include <half.h>
@@ -132,6 +133,32 @@ TEST_CASE("exr: layers have the channels, types and compression that the header 
   file.setFrameBuffer(buffer);
   file.readPixels(0, 1);
   for (std::size_t i = 0; i < 8; ++i) CHECK(z[i] == ramp(24)[3 * i + 2]);
+}
+
+TEST_CASE("exr: channels without a layer, and text in the header", "[io][exr]") {
+  const test::TemporaryDirectory scratch;
+  const auto path = scratch.path() / "a.exr";
+  using Kind = ExrLayerType::Kind;
+  const std::vector<ExrLayerType> layers{
+      {"", Kind::colour, false}, {"A", Kind::channel, false}, {"Z", Kind::channel, true}};
+  ExrWriter writer(path, ImageWindow::whole(4, 2), layers, {{"ptcx/names", "{\"1\":\"a\"}"}});
+  const std::vector<float> colour = ramp(24), scalar = ramp(8);
+  writer.write(2, std::array<std::span<const float>, 3>{colour, scalar, scalar});
+  writer.publish();
+  Imf::InputFile file(path.c_str());
+  std::string channels;
+  for (auto c = file.header().channels().begin(); c != file.header().channels().end(); ++c)
+    channels += std::string(c.name()) + (c.channel().type == Imf::HALF ? ":half " : ":float ");
+  CHECK(channels == "A:half B:half G:half R:half Z:float ");
+  const auto* text = file.header().findTypedAttribute<Imf::StringAttribute>("ptcx/names");
+  REQUIRE(text != nullptr);
+  CHECK(text->value() == "{\"1\":\"a\"}");
+  std::vector<float> z(8);
+  Imf::FrameBuffer buffer;
+  buffer.insert("Z", Imf::Slice::Make(Imf::FLOAT, z.data(), file.header().dataWindow()));
+  file.setFrameBuffer(buffer);
+  file.readPixels(0, 1);
+  CHECK(z == scalar);
 }
 
 TEST_CASE("exr: halves saturate instead of becoming infinite", "[io][exr]") {

@@ -151,6 +151,20 @@ TEST_CASE("gltf: only the nodes of the scene are read, and each of them once", "
   CHECK_THAT(files.fault(json), Contains("node 0 has two parents"));
 }
 
+TEST_CASE("gltf: objects are the nodes that show a mesh", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["meshes"].push_back(json["meshes"][0]);
+  json["meshes"][1]["name"] = "leaf";
+  json["meshes"][1]["primitives"].push_back(json["meshes"][0]["primitives"][0]);
+  json["scenes"][0]["nodes"] = Json::parse("[0, 1, 2, 4]");
+  json["nodes"] = Json::parse(R"([{"mesh": 1, "name": "tree"}, {"mesh": 1}, {"children": [3]},
+                                  {"mesh": 0, "name": 5}, {"mesh": 0, "name": "tree"}])");
+  const Mesh mesh = files.read(json).mesh;
+  CHECK(mesh.objects == std::vector<std::string>{"tree", "leaf", "node 3", "tree"});
+  CHECK(mesh.object_runs == std::vector<ObjectRun>{{0, 0}, {2, 1}, {4, 2}, {5, 3}});
+}
+
 TEST_CASE("gltf: strips and fans become triangles that face one side, points and lines nothing",
           "[io][gltf]") {
   const Files files;

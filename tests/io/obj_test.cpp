@@ -148,6 +148,50 @@ TEST_CASE("obj: millimetres are kept ten million metres from the origin", "[io][
   CHECK(static_cast<double>(mesh.positions[1].x) == Approx(0.003).epsilon(1e-6));
 }
 
+TEST_CASE("obj: objects are what follows an o, or a g without any o before it", "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  const auto check = [&](const std::string& text, const std::vector<std::string>& objects,
+                         const std::vector<ObjectRun>& runs) {
+    INFO(text);
+    const MeshFile file = read(scratch, kSquare + text);
+    CHECK(file.mesh.objects == objects);
+    CHECK(file.mesh.object_runs == runs);
+    CHECK(file.warnings.empty());
+  };
+  check("f 1 2 3 4\n", {}, {});
+  check("o a\nf 1 2 3\no b c # d\nf 1 2 3 4\nf 1 3 4\n", {"a", "b c"}, {{0, 0}, {1, 1}});
+  check("o a\ng x\nf 1 2 3\ng y\nf 1 2 3\n", {"a"}, {{0, 0}});
+  check("g x\nf 1 2 3\ng y z\nf 1 2 3\n", {"x", "y z"}, {{0, 0}, {1, 1}});
+  check("g x\nf 1 2 3\no y\nf 1 2 3\ng z\nf 1 3 4\n", {"x", "y"}, {{0, 0}, {1, 1}});
+  // An object goes on, one has no triangle with an area, and the first is not named
+  check("f 1 2 3\no a\nf 2 3 4\no b\nf 1 1 2\no a\nf 1 2 3\n", {"a", "", "b"},
+        {{0, 1}, {1, 0}, {2, 0}});
+  check("o a\no b\nf 1 2 3\n", {"a", "b"}, {{0, 1}});
+  check("o " + std::string(300, 'n') + "\nf 1 2 3\n", {std::string(255, 'n')}, {{0, 0}});
+}
+
+TEST_CASE("obj: too many objects count as one and are told, and so do those on the disk",
+          "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  std::string text = kSquare;
+  for (int i = 0; i < 65536; ++i) text += "g " + std::to_string(i) + "\n";
+  text += "f 1 2 3\n";
+  const MeshFile most = read(scratch, text);
+  CHECK(most.mesh.objects.size() == 65536);
+  CHECK(most.warnings.empty());
+  const MeshFile more = read(scratch, text + "g one\nf 1 2 3\ng two\nf 1 2 3\n");
+  CHECK(more.mesh.objects.empty());
+  CHECK(more.mesh.object_runs.empty());
+  REQUIRE(more.warnings.size() == 1);
+  CHECK_THAT(more.warnings[0], Contains("too many"));
+  // Names count for the memory that reading takes
+  const auto path = scratch.file("a.obj", text);
+  const MeshRoom room{.memory_bytes = std::uint64_t{4} << 20, .temp_directory = scratch.path()};
+  CHECK(read_mesh(path, room).spilled);
+  scratch.file("a.obj", kSquare + "f 1 2 3\ng two\nf 1 2 3\n");
+  CHECK_FALSE(read_mesh(path, room).spilled);
+}
+
 TEST_CASE("obj: an emission texture times Ke 0 0 0 is dark and told, and dark meshes do not emit",
           "[io][mesh]") {
   const test::TemporaryDirectory scratch;

@@ -288,6 +288,20 @@ TEST_CASE("ray scene: an inconsistent mesh is refused", "[scene][rays]") {
   refuses([](Mesh& m) { m.triangles[1][2] = 6; });
   refuses([](Mesh& m) { m.material_of.pop_back(); });
   refuses([](Mesh& m) { m.material_of[0] = 1; });
+  refuses([](Mesh& m) { m.objects = {"a"}; });
+  refuses([](Mesh& m) { m.object_runs = {{0, 0}}; });
+  const auto has_objects = [](const std::vector<ObjectRun>& runs) {
+    return [runs](Mesh& m) {
+      m.objects = {"a", "b"};
+      m.object_runs = runs;
+    };
+  };
+  Mesh apart = sound;
+  has_objects({{0, 1}, {1, 0}})(apart);
+  CHECK_NOTHROW(RayScene(apart));
+  refuses(has_objects({{1, 0}}));
+  refuses(has_objects({{0, 2}}));
+  refuses(has_objects({{0, 0}, {0, 1}}));
   refuses([](Mesh& m) { m.normals.resize(5); });
   refuses([](Mesh& m) { m.uvs.resize(7); });
   refuses([](Mesh& m) { m.positions[3].y = std::numeric_limits<float>::infinity(); });

@@ -16,6 +16,7 @@
 #include <ImfIO.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
 #include <half.h>
 
 #include "engine/io/file/file.h"
@@ -58,6 +59,8 @@ std::vector<std::string> channel_names(const ExrLayerType& layer) {
       return {prefix + "V"};
     case ExrLayerType::Kind::vector:
       return {prefix + "X", prefix + "Y", prefix + "Z"};
+    case ExrLayerType::Kind::channel:
+      return {layer.name};
     case ExrLayerType::Kind::colour:
       break;
   }
@@ -105,7 +108,8 @@ struct ExrWriter::State {
   unsigned written = 0;                   // rows
   std::vector<std::vector<half>> halves;  // rows of each layer in the type that is stored
 
-  State(const std::filesystem::path& target, const ImageWindow& held, std::vector<ExrLayerType> of)
+  State(const std::filesystem::path& target, const ImageWindow& held, std::vector<ExrLayerType> of,
+        const ExrText& text)
       : window(held), layers(std::move(of)), file(target), stream(file), halves(layers.size()) {
     const auto box = [](unsigned x, unsigned y, unsigned width, unsigned height) {
       const Imath::V2i low(static_cast<int>(x), static_cast<int>(y));
@@ -119,6 +123,7 @@ struct ExrWriter::State {
       for (const std::string& name : channel_names(layer))
         header.channels().insert(name, Imf::Channel(pixel_type(layer)));
     }
+    for (const auto& [name, value] : text) header.insert(name, Imf::StringAttribute(value));
     try {
       picture.emplace(stream, header, 0);
     } catch (...) {
@@ -129,9 +134,9 @@ struct ExrWriter::State {
 };
 
 ExrWriter::ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
-                     std::vector<ExrLayerType> layers) {
+                     std::vector<ExrLayerType> layers, const ExrText& text) {
   check_layers(window, layers);
-  state_ = std::make_unique<State>(target, window, std::move(layers));
+  state_ = std::make_unique<State>(target, window, std::move(layers), text);
 }
 
 ExrWriter::~ExrWriter() = default;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -58,20 +59,26 @@ struct Image {
 
 /// What an EXR file says of a layer. A colour has the channels "NAME.R", "NAME.G" and "NAME.B", or
 /// "R", "G" and "B" when the name is empty. A scalar has the channel "NAME.V"; a vector has the
-/// channels "NAME.X", "NAME.Y" and "NAME.Z".
+/// channels "NAME.X", "NAME.Y" and "NAME.Z". A layer of kind `channel` has the channel "NAME", for
+/// those that readers know without a layer: "A" is alpha, "Z" is depth.
 struct ExrLayerType {
   std::string name;
-  enum class Kind { colour, scalar, vector } kind = Kind::colour;
+  enum class Kind { colour, scalar, vector, channel } kind = Kind::colour;
   bool full_float = false;  ///< float channels; else half, where values above 65504 become 65504
 
   /// Returns the number of channels.
-  [[nodiscard]] unsigned components() const noexcept { return kind == Kind::scalar ? 1 : 3; }
+  [[nodiscard]] unsigned components() const noexcept {
+    return kind == Kind::scalar || kind == Kind::channel ? 1 : 3;
+  }
 };
 
 /// One layer of an EXR file with the values of all pixels.
 struct ExrLayer : ExrLayerType {
   std::vector<float> values;  ///< height x width x components
 };
+
+/// Texts in the header of an EXR file, by the names of their attributes.
+using ExrText = std::map<std::string, std::string>;
 
 /// The part of a picture that a file holds.
 struct ImageWindow {
@@ -93,10 +100,11 @@ class ExrWriter {
  public:
   /// Creates a temporary file for the picture.
   /// @param window  that the file holds: its data window; the picture is its display window
+  /// @param text    attributes of the header, whose names have 1 to 31 bytes
   /// @throws std::system_error; std::invalid_argument when a size is not is_image_size(), the
   ///         window leaves the picture, there is no layer or two have the same name
   ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
-            std::vector<ExrLayerType> layers);
+            std::vector<ExrLayerType> layers, const ExrText& text = {});
   ~ExrWriter();
   ExrWriter(const ExrWriter&) = delete;
   ExrWriter& operator=(const ExrWriter&) = delete;

@@ -46,8 +46,8 @@ class NodeWalk {
 
  private:
   // Notes that a mesh stands in a place.
-  void add_use(std::uint64_t mesh, const glm::dmat4& world) {
-    found_.uses.push_back({mesh, Placement(world)});
+  void add_use(std::uint64_t mesh, std::uint64_t node, const glm::dmat4& world) {
+    found_.uses.push_back({mesh, node, Placement(world)});
     constexpr std::size_t kUsesBetweenChecks = 1 << 12;
     if (found_.uses.size() % kUsesBetweenChecks == 0) check_uses(found_.uses.size());
   }
@@ -60,7 +60,8 @@ class NodeWalk {
   }
 
   // Notes the instances of a node. Source: Khronos, EXT_mesh_gpu_instancing.
-  void add_instances(std::uint64_t mesh, const Json& instancing, const glm::dmat4& world) {
+  void add_instances(std::uint64_t mesh, std::uint64_t node, const Json& instancing,
+                     const glm::dmat4& world) {
     const Json* const attributes = GltfDocument::member(instancing, "attributes");
     if (attributes == nullptr) document_.fail("the instances of a node have no attributes");
     std::optional<std::uint64_t> count;
@@ -75,7 +76,7 @@ class NodeWalk {
     const GltfDocument::Elements translations = find("TRANSLATION", 3);
     const GltfDocument::Elements rotations = find("ROTATION", 4);
     const GltfDocument::Elements scales = find("SCALE", 3);
-    if (!count) return add_use(mesh, world);
+    if (!count) return add_use(mesh, node, world);
     std::vector<GltfTransform> parts(*count);
     const auto read = [&](const GltfDocument::Elements& from, auto member) {
       if (from.components == 0) return;
@@ -87,7 +88,7 @@ class NodeWalk {
     read(translations, &GltfTransform::translation);
     read(rotations, &GltfTransform::rotation);
     read(scales, &GltfTransform::scale);
-    for (const GltfTransform& part : parts) add_use(mesh, world * part.matrix());
+    for (const GltfTransform& part : parts) add_use(mesh, node, world * part.matrix());
   }
 
   // Returns the nodes of the default scene or, in a file without scenes, those without a parent.
@@ -150,18 +151,18 @@ class NodeWalk {
         add_camera(*camera, node, world);
       const bool shows = node.contains("mesh") || GltfDocument::extension(node, kLights) != nullptr;
       found_.moves_mesh |= moves && shows;
-      if (search_ == GltfSearch::all) add_shown(node, world);
+      if (search_ == GltfSearch::all) add_shown(index, node, world);
       push(node_list(node, "children"), world, moves);
     }
   }
 
   // Notes the mesh and the light of a node.
-  void add_shown(const Json& node, const glm::dmat4& world) {
+  void add_shown(std::uint64_t index, const Json& node, const glm::dmat4& world) {
     if (const auto mesh = document_.unsigned_at(node, "mesh")) {
       if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
-        add_instances(*mesh, *instancing, world);
+        add_instances(*mesh, index, *instancing, world);
       } else {
-        add_use(*mesh, world);
+        add_use(*mesh, index, world);
       }
     }
     if (const Json* const light = GltfDocument::extension(node, kLights)) add_light(*light, world);

@@ -14,6 +14,7 @@ namespace ptc {
 /// A mesh, by its index in the file, in one place. The place may flatten it.
 struct GltfUse {
   std::uint64_t mesh;
+  std::uint64_t node;  ///< that shows it
   Placement place;
 };
 

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -73,6 +74,25 @@ void transform_positions(Mesh& mesh, const glm::dmat4& transform, const glm::dve
   mesh.origin = origin;
 }
 
+// Makes the triangles of a mesh that has no objects one.
+void complete_objects(Mesh& mesh) {
+  if (!mesh.objects.empty() || mesh.triangles.empty()) return;
+  mesh.objects.emplace_back();
+  mesh.object_runs.push_back({});
+}
+
+// Appends the objects of a mesh whose triangles are appended next.
+void append_objects(Mesh& mesh, Mesh& added) {
+  if (mesh.objects.empty() && added.objects.empty()) return;
+  complete_objects(mesh);
+  complete_objects(added);
+  const auto triangle = static_cast<std::uint32_t>(mesh.triangles.size()),
+             object = static_cast<std::uint32_t>(mesh.objects.size());
+  for (const ObjectRun& run : added.object_runs)
+    mesh.object_runs.push_back({triangle + run.first, object + run.object});
+  std::ranges::move(added.objects, std::back_inserter(mesh.objects));
+}
+
 // Turns the normals, and reverses the triangles when the transform mirrors.
 void transform_directions(Mesh& mesh, const glm::dmat4& transform) {
   const glm::dmat3 turn = normal_transform(transform);
@@ -114,8 +134,10 @@ bool Mesh::is_opaque() const {
 std::uint64_t bytes_of(const Mesh& mesh) noexcept {
   constexpr std::uint64_t kTriangle = sizeof(mesh.triangles[0]) + sizeof(mesh.material_of[0]),
                           kVertex = 2 * sizeof(glm::vec3) + sizeof(glm::vec2);
+  std::uint64_t objects = mesh.object_runs.size() * sizeof(ObjectRun);
+  for (const std::string& name : mesh.objects) objects += sizeof(name) + name.capacity();
   return mesh.triangles.size() * kTriangle + mesh.positions.size() * kVertex +
-         mesh.colours.size() * sizeof(glm::vec3);
+         mesh.colours.size() * sizeof(glm::vec3) + objects;
 }
 
 MeshFile read_mesh(const std::filesystem::path& path, const MeshRoom& room) {
@@ -168,6 +190,7 @@ void append_mesh(Mesh& mesh, const Mesh& other, const glm::dmat4& transform, con
   if (added.positions.size() > 0xffffffffU - base) {
     throw RequestError(field, "the meshes have 2^32 vertices or more together");
   }
+  append_objects(mesh, added);
   const std::size_t material_base = mesh.materials.size();
   mesh.positions.insert(mesh.positions.end(), added.positions.begin(), added.positions.end());
   mesh.normals.insert(mesh.normals.end(), added.normals.begin(), added.normals.end());

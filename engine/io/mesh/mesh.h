@@ -38,7 +38,10 @@ struct TextureWrap {
 
 /// A material: diffuse reflectance, emission and opacity of a set of triangles.
 struct Material {
-  std::string name;        ///< as the file has it; may be empty
+  std::string name;  ///< as the file has it; may be empty
+  /// The mesh file that defines it: materials of one name are one in a file, and may be two in two
+  /// files. Empty for those that a mesh in memory or a scene file defines.
+  std::string file{};
   glm::vec3 albedo{0.5f};  ///< linear RGB; multiplied by the texture if there is one
   std::shared_ptr<const Texture> texture;  ///< linear RGB, row 0 at the top; may be null
   /// Radiance of the front side, RGB, W / (m^2 sr); multiplied by `emission_texture` if there is
@@ -62,6 +65,15 @@ struct Material {
 /// The maximum number of materials of a mesh.
 inline constexpr std::size_t kMaxMaterials = 65536;
 
+/// Triangles that follow one another and are of one object: those from `first` on, up to the next
+/// run.
+struct ObjectRun {
+  std::uint32_t first = 0;   ///< index of a triangle
+  std::uint32_t object = 0;  ///< index into Mesh::objects
+
+  bool operator==(const ObjectRun&) const = default;
+};
+
 /// Triangles with shared vertices. Positions are relative to `origin`, so that coordinates of ten
 /// million metres keep millimetres.
 struct Mesh {
@@ -76,6 +88,10 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from the front
   std::vector<std::uint16_t> material_of;               ///< index into materials, per triangle
   std::vector<Material> materials;                      ///< at least one
+  /// Names of the objects that are told apart; empty: all triangles are one object without a name.
+  std::vector<std::string> objects{};
+  /// By increasing `first`, from triangle 0 on; empty where `objects` is.
+  std::vector<ObjectRun> object_runs{};
 
   /// Returns the box around all vertices in world coordinates.
   [[nodiscard]] Bounds bounds() const;
@@ -119,7 +135,8 @@ struct MeshRoom {
   std::filesystem::path temp_directory = ".";
   /// Reads the textures; null: they stay in memory.
   std::shared_ptr<TextureStore> textures;
-  /// Takes the place of all materials of the mesh, which keep their names, sides and opacity.
+  /// Takes the place of all materials of the mesh, which keep their sides and opacity, and their
+  /// names where it has none.
   std::optional<Material> material;
   /// Whether only fronts reflect in formats that say nothing of sides: all but glTF.
   bool one_sided = false;
@@ -166,6 +183,10 @@ struct MeshFile {
 /// even concave ones. Degenerate triangles and vertices without a triangle are dropped. Every index
 /// is checked. If only some triangles have normals, the others get flat ones.
 ///
+/// Objects are the nodes of glTF that show a mesh, and what follows an `o` of OBJ, or a `g` in
+/// files without `o`. Other formats do not tell objects apart, nor is that known of more than
+/// 65,536 objects in a file, or of a mesh on the disk.
+///
 /// Albedo is Kd of MTL and the base colour of glTF, emission Ke and emissiveFactor, all linear,
 /// with their textures. A map_Ke without Ke is the emission itself. Opacity is d, or 1 - Tr, and
 /// map_d of MTL, by its alpha or else by its grey; in glTF it is the alpha of the base colour where
@@ -203,10 +224,10 @@ struct CameraFile {
 [[nodiscard]] CameraFile read_cameras(const std::filesystem::path& path,
                                       std::optional<double> seconds, std::uint64_t memory_bytes);
 
-/// Appends a transformed copy of `other` to `mesh`; both keep their materials. An empty mesh takes
-/// its origin from the copy, any other keeps its own. If only one of the two has normals or texture
-/// coordinates, the other gets flat normals or (0, 0). A transform that mirrors also reverses the
-/// triangles, so that fronts stay fronts.
+/// Appends a transformed copy of `other` to `mesh`; both keep their materials and objects. An empty
+/// mesh takes its origin from the copy, any other keeps its own. If only one of the two has normals
+/// or texture coordinates, the other gets flat normals or (0, 0). A transform that mirrors also
+/// reverses the triangles, so that fronts stay fronts.
 /// @param transform  affine map of world positions
 /// @param field      the member of the request that the meshes come from, for RequestError
 /// @throws std::invalid_argument when the transform is not finite and invertible; RequestError when

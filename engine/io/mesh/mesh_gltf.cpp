@@ -88,7 +88,13 @@ class GltfMesh {
     std::vector<PlacedMesh> placed;
     if (!copies_fit()) placed = read_placed();
     begin_soup();
-    for (const auto& [mesh, place] : uses_) add_mesh(mesh, glm::dmat4(place));
+    std::optional<std::uint64_t> node;
+    for (const GltfUse& use : uses_) {
+      if (node != use.node) soup_.begin_object(object_name(use));
+      node = use.node;
+      add_mesh(use.mesh, glm::dmat4(use.place));
+    }
+    if (soup_.has_too_many_objects()) warnings_.add(kObjectsLeftOut, "65,536 nodes or more");
     for (std::size_t i = 0; i < document_.count("skins"); ++i) {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }
@@ -118,6 +124,17 @@ class GltfMesh {
   MeshFile end_soup() {
     if (!has_uvs_) soup_.drop_uvs();
     return mesh_file(std::move(soup_), {}, {}, true);
+  }
+
+  // Returns the name of a node that shows a mesh, else that of the mesh, else its number.
+  std::string object_name(const GltfUse& use) {
+    for (const Json* const json :
+         {&document_.at("nodes", use.node), &document_.at("meshes", use.mesh)}) {
+      const auto name = json->find("name");
+      if (name != json->end() && name->is_string() && !name->get_ref<const std::string&>().empty())
+        return name->get<std::string>();
+    }
+    return "node " + std::to_string(use.node);
   }
 
   // Calls a function for each primitive of a mesh that has triangles.

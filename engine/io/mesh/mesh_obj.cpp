@@ -5,8 +5,10 @@
 //   vn x y z           a normal                                      POSITION[/[UV][/NORMAL]]
 //   vt u v             texture coordinates     usemtl NAME           material of what follows
 //   mtllib FILE ...    material libraries      # ...                 comment
+//   o NAME             object of what follows  g NAME ...            group of what follows
 //
-// Statements of other kinds (groups, curves, smoothing) are skipped. Positions, normals and texture
+// Groups count as objects in files that have no objects before them. Statements of other kinds
+// (curves, smoothing) are skipped. Positions, normals and texture
 // coordinates are counted separately; negative indices count backwards from the last one read.
 #include <algorithm>
 #include <array>
@@ -83,6 +85,9 @@ class ObjMesh {
       material_ = use_material(std::string(words.rest()));
     } else if (keyword == "mtllib") {
       read_libraries(words);
+    } else if (keyword == "o" || (keyword == "g" && !has_objects_)) {
+      has_objects_ |= keyword == "o";
+      use_object(std::string(words.rest()));
     }
   }
 
@@ -170,6 +175,21 @@ class ObjMesh {
     return index;
   }
 
+  // Puts what follows into an object, which may go on after others.
+  void use_object(std::string name) {
+    constexpr std::size_t kMaxName = 255;
+    name.resize(std::min(name.size(), kMaxName));
+    const auto known = objects_.find(name);
+    if (known != objects_.end()) {
+      soup_.resume_object(known->second);
+    } else if (!soup_.spilled() && !soup_.has_too_many_objects()) {
+      objects_[name] = soup_.begin_object(name);
+      if (!soup_.has_too_many_objects()) return;
+      objects_.clear();
+      warnings_.add(kObjectsLeftOut, "65,536 objects or more");
+    }
+  }
+
   // Reads libraries: names that are separated by blanks, or one name with blanks in it, which may
   // be escaped by backslashes.
   void read_libraries(Words& words) {
@@ -211,12 +231,14 @@ class ObjMesh {
   MeshSoup soup_;
   MeshWarnings warnings_;
   TextureLoader textures_;
-  std::set<std::string> libraries_;          // paths of libraries that were read
-  std::map<std::string, Material> defined_;  // materials of the libraries by name
-  std::map<std::string, std::size_t> used_;  // index in the soup by name
-  std::optional<std::size_t> material_;      // of the next face
-  std::vector<std::size_t> plain_;           // materials that no library defines
-  std::vector<Corner> corners_;              // of one face, kept between calls
+  std::set<std::string> libraries_;               // paths of libraries that were read
+  std::map<std::string, Material> defined_;       // materials of the libraries by name
+  std::map<std::string, std::size_t> used_;       // index in the soup by name
+  std::optional<std::size_t> material_;           // of the next face
+  std::vector<std::size_t> plain_;                // materials that no library defines
+  std::map<std::string, std::uint32_t> objects_;  // index in the soup by name
+  bool has_objects_ = false;                      // there was an `o`
+  std::vector<Corner> corners_;                   // of one face, kept between calls
 };
 
 }  // namespace

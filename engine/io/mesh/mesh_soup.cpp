@@ -35,6 +35,7 @@ constexpr std::uint32_t kNone = MeshSoup::kNone;
 struct Soup {
   std::vector<Triangle> triangles;
   std::vector<std::uint16_t> material_of;
+  std::vector<ObjectRun> object_runs;
 };
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& rule) {
@@ -63,8 +64,17 @@ Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& position
   made.material_of.reserve(soup.polygons.size());
   std::vector<glm::dvec3> polygon;
   std::vector<std::array<std::uint32_t, 3>> cut;
-  std::size_t first = 0;
+  std::size_t first = 0, number = 0;
+  auto run = soup.object_runs().begin();
   for (const MeshSoup::Polygon& of : soup.polygons.items()) {
+    if (run != soup.object_runs().end() && run->first == number) {
+      const auto triangle = static_cast<std::uint32_t>(made.triangles.size());
+      // Drop a run that has no triangle
+      if (!made.object_runs.empty() && made.object_runs.back().first == triangle)
+        made.object_runs.pop_back();
+      made.object_runs.push_back({triangle, run++->object});
+    }
+    ++number;
     const auto corners = std::span(soup.corners.items()).subspan(first, of.corners);
     first += of.corners;
     polygon.clear();
@@ -219,6 +229,39 @@ std::size_t MeshSoup::add_material(Material material) {
   return materials.size() - 1;
 }
 
+std::uint32_t MeshSoup::begin_object(const std::string& name) {
+  constexpr std::size_t kMaxObjects = 65536, kMaxName = 255;
+  if (spilled() || too_many_objects_) return 0;
+  if (objects_.size() == kMaxObjects) {
+    too_many_objects_ = true;
+    forget_objects();
+    return 0;
+  }
+  objects_.push_back(name.substr(0, kMaxName));
+  object_bytes_ += sizeof(std::string) + objects_.back().capacity();
+  const auto object = static_cast<std::uint32_t>(objects_.size() - 1);
+  resume_object(object);
+  return object;
+}
+
+void MeshSoup::resume_object(std::uint32_t object) {
+  if (objects_.empty()) return;
+  // What comes before all objects is one without a name
+  if (runs_.empty() && !polygons.empty()) {
+    objects_.emplace_back();
+    object_bytes_ += sizeof(std::string);
+    runs_.push_back({0, static_cast<std::uint32_t>(objects_.size() - 1)});
+  }
+  if (!runs_.empty() && runs_.back().first == polygons.size()) runs_.pop_back();
+  runs_.push_back({polygons.size(), object});
+}
+
+void MeshSoup::forget_objects() {
+  objects_ = {};
+  runs_ = {};
+  object_bytes_ = 0;
+}
+
 void MeshSoup::add_polygon(std::span<const Corner> polygon, std::size_t material) {
   corners.append(polygon);
   triangles_ += std::max<std::size_t>(polygon.size(), 2) - 2;
@@ -235,7 +278,8 @@ void MeshSoup::drop_uvs() {
 std::uint64_t MeshSoup::peak_bytes() const noexcept {
   // The bytes of an item of each list, and of what build_mesh() makes of it before it is freed
   return 12 * corners.size() + 94 * triangles_ + 8 * polygons.size() + 56 * positions.size() +
-         40 * normals.size() + 24 * uvs.size() + 24 * colours.size();
+         40 * normals.size() + 24 * uvs.size() + 24 * colours.size() +
+         (sizeof(Run) + sizeof(ObjectRun)) * runs_.size() + 2 * object_bytes_;
 }
 
 void MeshSoup::check_room() {
@@ -247,6 +291,7 @@ void MeshSoup::check_room() {
   colours.spill(room_.temp_directory);
   corners.spill(room_.temp_directory);
   polygons.spill(room_.temp_directory);
+  forget_objects();
 }
 
 void MeshSoup::settle() {
@@ -255,7 +300,7 @@ void MeshSoup::settle() {
   for (Material& material : materials) {
     if (room_.material) {
       Material other = *room_.material;
-      other.name = std::move(material.name);
+      if (other.name.empty()) other.name = std::move(material.name);
       other.double_sided = material.double_sided;
       other.opacity = material.opacity;
       other.opacity_texture = std::move(material.opacity_texture);
@@ -289,6 +334,10 @@ Mesh build_mesh(MeshSoup soup) {
   share_vertices(soup, made.triangles, positions, mesh);
   mesh.material_of = std::move(made.material_of);
   mesh.materials = std::move(soup.materials);
+  if (!mesh.triangles.empty() && !made.object_runs.empty()) {
+    mesh.objects = soup.objects();
+    mesh.object_runs = std::move(made.object_runs);
+  }
   return mesh;
 }
 

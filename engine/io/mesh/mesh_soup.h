@@ -63,6 +63,12 @@ class MeshSoup {
   Spool<Polygon> polygons;
   std::vector<Material> materials;  ///< if empty, settle() adds one of default values
 
+  /// Polygons that follow one another and are of one object.
+  struct Run {
+    std::uint64_t first = 0;   ///< number of the first polygon
+    std::uint32_t object = 0;  ///< index into objects()
+  };
+
   /// Returns the name of the file.
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Says whether the lists are on the disk, because the mesh would not fit in memory.
@@ -91,6 +97,15 @@ class MeshSoup {
   /// Adds a material and returns its index.
   /// @throws DataError when there are 65,536 materials already
   std::size_t add_material(Material material);
+  /// Adds an object, to which the polygons belong that follow, and returns its index. Where there
+  /// are too many, or the lists are on the disk, objects are forgotten.
+  std::uint32_t begin_object(const std::string& name);
+  /// Goes on with an object that was begun.
+  void resume_object(std::uint32_t object);
+  [[nodiscard]] const std::vector<std::string>& objects() const noexcept { return objects_; }
+  [[nodiscard]] const std::vector<Run>& object_runs() const noexcept { return runs_; }
+  /// Says whether objects are forgotten because there are too many of them.
+  [[nodiscard]] bool has_too_many_objects() const noexcept { return too_many_objects_; }
   /// Adds a polygon with an index of a material.
   /// @throws as add_position()
   void add_polygon(std::span<const Corner> polygon, std::size_t material);
@@ -119,7 +134,13 @@ class MeshSoup {
 
   std::filesystem::path path_;
   MeshRoom room_;
+  void forget_objects();
+
   bool uvs_dropped_ = false;
+  std::vector<std::string> objects_;
+  std::vector<Run> runs_;
+  std::uint64_t object_bytes_ = 0;  ///< memory of the names
+  bool too_many_objects_ = false;
   std::uint64_t triangles_ = 0;  ///< that the polygons become, at most
 };
 

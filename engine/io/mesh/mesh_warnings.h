@@ -49,6 +49,9 @@ inline constexpr WarningKind kMorphLeftOut{
     "stored"};
 inline constexpr WarningKind kAnimationLeftOut{"a part of an animation is left out",
                                                "parts of animations are left out"};
+inline constexpr WarningKind kObjectsLeftOut{
+    "all its objects count as one, because there are too many to tell them apart",
+    "lists of objects count as one object each, because they are too long"};
 inline constexpr WarningKind kLightLeftOut{
     "a light is left out because it has no place or no direction",
     "lights are left out because they have no place or no direction"};

@@ -27,6 +27,8 @@ void add_box(Mesh& mesh, const glm::dvec3& low, const glm::dvec3& high, const Ma
   Mesh box;
   box.origin = low;
   box.materials.push_back(material);
+  box.objects.push_back(material.name);
+  box.object_runs.push_back({});
   const glm::vec3 size(high - low);
   for (int corner = 0; corner < 8; ++corner) {
     box.positions.emplace_back(corner & 1 ? size.x : 0, corner & 2 ? size.y : 0,
@@ -80,6 +82,18 @@ void add_in_places(const std::vector<Item>& items, const std::vector<Placement>&
   }
 }
 
+/// Says which file the objects and materials of a mesh come from.
+void name_parts(Mesh& mesh, const SceneObject& object) {
+  const std::string file = object.file.filename().string();
+  if (mesh.objects.empty() && !mesh.triangles.empty()) {
+    mesh.objects.emplace_back();
+    mesh.object_runs.push_back({});
+  }
+  for (std::string& name : mesh.objects) name = name.empty() ? file : file + ":" + name;
+  if (object.material && !object.material->name.empty()) return;
+  for (Material& material : mesh.materials) material.file = object.file.string();
+}
+
 std::optional<double> seconds_of(const std::optional<Moment>& moment) {
   return moment ? std::optional(moment->seconds) : std::nullopt;
 }
@@ -115,11 +129,18 @@ class Joiner {
   [[nodiscard]] TextureStore& textures() noexcept { return *textures_; }
 
   /// Adds a mesh that stands where its positions say.
-  void add(Mesh mesh) { add(std::move(mesh), {}, "the mesh"); }
+  void add(Mesh mesh) {
+    if (mesh.objects.empty() && !mesh.triangles.empty()) {
+      mesh.objects.emplace_back("mesh");
+      mesh.object_runs.push_back({});
+    }
+    add(std::move(mesh), {}, "the mesh");
+  }
   /// Adds the meshes of a file.
   /// @param places  where they stand; none: where their positions say
   void add(MeshFile file, const SceneObject& object) {
     const std::string name = object.file.string();
+    name_parts(file.mesh, object);
     add(std::move(file.mesh), object.places, name);
     if (file.spilled) add_apart({nullptr, std::move(file.spilled), object.places}, name);
     for (PlacedMesh& placed : file.placed) {

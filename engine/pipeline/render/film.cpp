@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
+
+#include "engine/io/image/srgb.h"
 
 namespace ptc {
 namespace {
@@ -15,6 +18,38 @@ namespace {
 std::span<const float> flat(const std::vector<glm::vec3>& values) {
   static_assert(sizeof(glm::vec3) == 3 * sizeof(float));
   return {values.empty() ? nullptr : &values.front().x, values.size() * 3};
+}
+
+/// Returns the linear values that a .png stores as numbers from 0 to 1.
+glm::vec3 stored_as(const glm::vec3& numbers) {
+  glm::vec3 linear;
+  for (int c = 0; c < 3; ++c)
+    linear[c] = static_cast<float>(srgb_to_linear(static_cast<double>(numbers[c])));
+  return linear;
+}
+
+/// Returns a colour whose numbers are (n + 1) / 2; black where there is no normal.
+glm::vec3 colour_of_normal(const glm::vec3& normal) {
+  return normal == glm::vec3(0) ? glm::vec3(0) : stored_as(0.5F * normal + 0.5F);
+}
+
+/// Returns a colour for a number, black for 0. Multiples of the golden ratio spread the hues of
+/// numbers that follow one another, those of the plastic number saturation and brightness.
+glm::vec3 colour_of_id(float id) {
+  if (id == 0) return glm::vec3(0);
+  const auto turn = [id](double step) {
+    const double turns = step * static_cast<double>(id);
+    return static_cast<float>(turns - std::floor(turns));
+  };
+  const float hue = 6 * turn(0.6180339887498949),
+              saturation = 0.5F + 0.4F * turn(0.7548776662466927),
+              value = 0.95F - 0.35F * turn(0.5698402909980532);
+  glm::vec3 colour;
+  for (int c = 0; c < 3; ++c) {
+    const float away = std::fmod(hue + static_cast<float>(5 - 2 * c), 6.0F);
+    colour[c] = value * (1 - saturation * std::clamp(std::min(away, 4 - away), 0.0F, 1.0F));
+  }
+  return stored_as(colour);
 }
 
 }  // namespace
@@ -34,6 +69,13 @@ Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
     reflection_occlusion_.resize(pixels, 0);
   }
   if (extras.irradiance) irradiance_.resize(pixels, glm::vec3(0));
+  if (extras.surfaces) {
+    depth_.resize(pixels, std::numeric_limits<float>::infinity());
+    for (auto* layer : {&position_, &normal_}) layer->resize(pixels, glm::vec3(0));
+  }
+  if (extras.ids) {
+    for (auto* layer : {&object_id_, &material_id_}) layer->resize(pixels, 0);
+  }
   for (const std::string& name : extras.shadows)
     shadows_.emplace_back(name, std::vector<float>(pixels));
 }
@@ -41,7 +83,9 @@ Film::Film(unsigned width, unsigned height, const FilmExtras& extras)
 std::uint64_t Film::pixel_bytes(const FilmExtras& extras) noexcept {
   return 5 * sizeof(glm::vec3) + (extras.estimates ? 4 : 2) * sizeof(float) +
          (extras.glossy ? sizeof(glm::vec3) + sizeof(float) : 0) +
-         (extras.irradiance ? sizeof(glm::vec3) : 0) + extras.shadows.size() * sizeof(float);
+         (extras.irradiance ? sizeof(glm::vec3) : 0) +
+         (extras.surfaces ? sizeof(float) + 2 * sizeof(glm::vec3) : 0) +
+         (extras.ids ? 2 * sizeof(float) : 0) + extras.shadows.size() * sizeof(float);
 }
 
 void Film::add(std::size_t pixel, const PrimaryHit& hit, const Shading& shading, float weight) {
@@ -73,6 +117,19 @@ void Film::add(std::size_t pixel, std::span<const float> shadows, float weight) 
   for (std::size_t i = 0; i < shadows.size(); ++i) shadows_[i].second[pixel] += weight * shadows[i];
 }
 
+void Film::add(std::size_t pixel, const SurfaceSample& surface) {
+  constexpr float kNearer = 1 - 1e-6F;  // a rounding does not choose between equal depths
+  if (!(surface.depth < kNearer * depth_[pixel])) return;
+  depth_[pixel] = surface.depth;
+  position_[pixel] = surface.position;
+  normal_[pixel] = surface.normal;
+}
+
+void Film::set_ids(std::size_t pixel, const SurfaceId& id) {
+  object_id_[pixel] = static_cast<float>(id.object);
+  material_id_[pixel] = static_cast<float>(id.material);
+}
+
 void Film::add_group(const std::string& layer, const Film& group, unsigned first) {
   // Light adds up
   const auto at = std::ptrdiff_t{first} * width_;
@@ -84,11 +141,18 @@ void Film::add_group(const std::string& layer, const Film& group, unsigned first
   add(indirect_, group.indirect_);
 
   // The rest is the same for all groups
-  const auto take = [at](auto& to, const auto& from) { std::ranges::copy(from, to.begin() + at); };
+  const auto take = [at](auto& to, const auto& from) {
+    if (!from.empty()) std::ranges::copy(from, to.begin() + at);
+  };
   take(bent_normal_, group.bent_normal_);
   take(albedo_, group.albedo_);
   take(occlusion_, group.occlusion_);
   take(alpha_, group.alpha_);
+  take(depth_, group.depth_);
+  take(position_, group.position_);
+  take(normal_, group.normal_);
+  take(object_id_, group.object_id_);
+  take(material_id_, group.material_id_);
   auto own =
       std::ranges::find(groups_, layer, &std::pair<std::string, std::vector<glm::vec3>>::first);
   if (own == groups_.end())
@@ -97,6 +161,7 @@ void Film::add_group(const std::string& layer, const Film& group, unsigned first
 }
 
 void Film::finish() {
+  std::ranges::replace(depth_, std::numeric_limits<float>::infinity(), kNoDepth);
   for (auto* layer : {&occlusion_error_, &irradiance_error_}) {
     for (float& value : *layer) value = std::sqrt(value);
   }
@@ -104,13 +169,24 @@ void Film::finish() {
 
 std::vector<Film::Layer> Film::layers() const {
   using Kind = ExrLayerType::Kind;
+  // Nuke and Blender read R G B A as the picture and Z as its depth, NAME.R and NAME.X as those of
+  // a layer, and any other channel of a layer, such as NAME.V, by itself
   std::vector<Layer> layers{{{"", Kind::colour, false}, flat(beauty_)},
                             {{"direct", Kind::colour, false}, flat(direct_)},
                             {{"indirect", Kind::colour, false}, flat(indirect_)},
                             {{"albedo", Kind::colour, false}, flat(albedo_)},
                             {{"occlusion", Kind::scalar, false}, occlusion_},
-                            {{"alpha", Kind::scalar, false}, alpha_},
+                            {{"A", Kind::channel, false}, alpha_},
                             {{"bent_normal", Kind::vector, true}, flat(bent_normal_)}};
+  if (!depth_.empty()) {
+    layers.push_back({{"Z", Kind::channel, true}, depth_});
+    layers.push_back({{"P", Kind::vector, true}, flat(position_)});
+    layers.push_back({{"N", Kind::vector, false}, flat(normal_)});
+  }
+  if (!object_id_.empty()) {
+    layers.push_back({{"object_id", Kind::scalar, true}, object_id_});
+    layers.push_back({{"material_id", Kind::scalar, true}, material_id_});
+  }
   if (!occlusion_error_.empty()) {
     layers.push_back({{"occlusion_error", Kind::scalar, true}, occlusion_error_});
     layers.push_back({{"irradiance_error", Kind::scalar, true}, irradiance_error_});
@@ -131,12 +207,17 @@ std::vector<Film::Layer> Film::layers() const {
 std::vector<glm::vec3> Film::shown(std::string_view layer, unsigned row, unsigned rows) const {
   const std::size_t first = std::size_t{row} * width_, count = std::size_t{rows} * width_;
   std::vector<glm::vec3> pixels;
-  if (layer == "occlusion") {
+  const auto show = [&](const auto& values, const auto& shown_as) {
     pixels.reserve(count);
-    for (const float occlusion : std::span(occlusion_).subspan(first, count))
-      pixels.emplace_back(1 - occlusion);
+    for (const auto& value : std::span(values).subspan(first, count))
+      pixels.emplace_back(shown_as(value));
     return pixels;
-  }
+  };
+  if (layer == "occlusion") return show(occlusion_, [](float value) { return 1 - value; });
+  if (layer == "depth") return show(depth_, [](float value) { return value; });
+  if (layer == "normal") return show(normal_, colour_of_normal);
+  if (layer == "object_id") return show(object_id_, colour_of_id);
+  if (layer == "material_id") return show(material_id_, colour_of_id);
   const std::vector<glm::vec3>& from = layer == "direct"       ? direct_
                                        : layer == "indirect"   ? indirect_
                                        : layer == "albedo"     ? albedo_

@@ -14,23 +14,39 @@
 #include "engine/io/image/image.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/surface_ids.h"
 #include "engine/shade/shading.h"
 
 namespace ptc {
 
-/// The layers that a .png can show; `occlusion` is white where nothing covers.
-inline constexpr std::array<std::string_view, 7> kPictureLayers{
-    "beauty", "direct", "indirect", "occlusion", "albedo", "reflection", "irradiance"};
+/// The layers that a .png can show (spec/guide/render.md#layers).
+inline constexpr std::array<std::string_view, 11> kPictureLayers{
+    "beauty",     "direct", "indirect", "occlusion", "albedo",     "reflection",
+    "irradiance", "depth",  "normal",   "object_id", "material_id"};
+
+/// Depth where no surface is seen, scene units: beyond all surfaces, yet finite, so that filters
+/// of pictures stay numbers.
+inline constexpr float kNoDepth = 1e10F;
 
 /// Layers that a picture has only when they are asked for.
 struct FilmExtras {
   bool estimates = false;            ///< occlusion_error and irradiance_error
   bool glossy = false;               ///< reflection and reflection_occlusion
   bool irradiance = false;           ///< irradiance of lamps, sky and surfaces together
+  bool surfaces = false;             ///< depth, position and normal
+  bool ids = false;                  ///< object_id and material_id
   std::vector<std::string> shadows;  ///< names of layers of shadows
 };
 
-/// The layers of some rows of a picture: weighted means over the samples of every pixel.
+/// Where a sample meets a surface.
+struct SurfaceSample {
+  float depth = 0;        ///< from the camera along its view, scene units
+  glm::vec3 position{0};  ///< scene units
+  glm::vec3 normal{0};    ///< unit
+};
+
+/// The layers of some rows of a picture: weighted means over the samples of every pixel, but for
+/// depth, position, normal and numbers, of which there is no mean.
 /// Memory: pixel_bytes() for each pixel.
 class Film {
  public:
@@ -58,6 +74,13 @@ class Film {
   void add(std::size_t pixel, const Reflection& reflection, float weight);
   /// Adds the shadows of a sample that meets a surface, one for each layer of shadows.
   void add(std::size_t pixel, std::span<const float> shadows, float weight);
+  /// Adds the place of a sample that meets a surface. The nearest one of a pixel stays; of several
+  /// whose depth differs by a millionth at most, the first.
+  /// @pre the film has surfaces
+  void add(std::size_t pixel, const SurfaceSample& surface);
+  /// Sets the numbers of the object and the material of a pixel.
+  /// @pre the film has them
+  void set_ids(std::size_t pixel, const SurfaceId& id);
   /// Adds a sample that meets nothing but the sky.
   /// @param radiance  W / (m^2 sr)
   void add_sky(std::size_t pixel, const glm::vec3& radiance, float weight) {
@@ -68,11 +91,11 @@ class Film {
   /// what all groups have in common is kept.
   /// @param layer  name of the group's layer
   /// @param first  row of this film where the first row of `group` lies
-  /// @pre same width, no extras
+  /// @pre same width, and the same extras: surfaces and ids at most
   void add_group(const std::string& layer, const Film& group, unsigned first);
 
-  /// Completes the layers of estimates: mean squares become root mean squares. Nothing can be added
-  /// afterwards.
+  /// Completes the layers of estimates: mean squares become root mean squares, and depth where
+  /// there is no surface. Nothing can be added afterwards.
   void finish();
 
   /// A layer of an .exr and its values.
@@ -82,10 +105,12 @@ class Film {
   };
   /// Returns all layers, in the order of the file.
   [[nodiscard]] std::vector<Layer> layers() const;
+  /// Says whether the film has depth, position and normal.
+  [[nodiscard]] bool has_surfaces() const noexcept { return !depth_.empty(); }
   /// Says whether the film has a layer of irradiance.
   [[nodiscard]] bool has_irradiance() const noexcept { return !irradiance_.empty(); }
   /// Returns the values of a layer of a .png, one of kPictureLayers, in full. Irradiance is shown
-  /// as the radiance of a white surface.
+  /// as the radiance of a white surface; depth is returned as it is.
   /// @param row, rows  the rows of this film that are wanted
   [[nodiscard]] std::vector<glm::vec3> shown(std::string_view layer, unsigned row,
                                              unsigned rows) const;
@@ -101,6 +126,9 @@ class Film {
   std::vector<std::pair<std::string, std::vector<float>>> shadows_;  ///< layers by name
   std::vector<float> reflection_occlusion_;                          ///< empty without reflections
   std::vector<glm::vec3> irradiance_;  ///< W / m^2; empty unless it is asked for
+  std::vector<float> depth_;           ///< this and the next two: empty without surfaces
+  std::vector<glm::vec3> position_, normal_;
+  std::vector<float> object_id_, material_id_;  ///< empty without ids
 };
 
 }  // namespace ptc

@@ -44,6 +44,13 @@ void check_targets(const RenderRequest& request, std::span<const PictureTarget> 
       throw RequestError("targets",
                          "a picture has no layer 'irradiance': only what is baked has it");
     }
+    const bool is_seen = target.layer == "depth" || target.layer == "normal",
+               is_id = target.layer == "object_id" || target.layer == "material_id";
+    if ((is_seen && request.bakes()) || (is_id && request.vertices)) {
+      throw RequestError("targets", fmt::format("{} have no layer '{}': only pictures{} have it",
+                                                request.vertices ? "vertices" : "textures",
+                                                target.layer, is_id ? " and textures" : ""));
+    }
     has_all |= ending == ".exr" || ending == ".ply";
   }
   const auto needs_all = [&](bool asked, const char* field) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -28,6 +29,18 @@ struct PictureTarget {
 /// Says whether a layer is light, whose exposure matters.
 [[nodiscard]] bool is_light(std::string_view layer) noexcept;
 
+/// Shows depth: the nearest surface is white, the farthest dark, and nothing is black.
+class DepthRange {
+ public:
+  /// Looks at some of the pixels of a picture, whose depth is in all channels.
+  void add(std::span<const glm::vec3> pixels) noexcept;
+  /// Turns depth into grey. @pre all pixels were added
+  void show(std::span<glm::vec3> pixels) const noexcept;
+
+ private:
+  float nearest_ = kNoDepth, farthest_ = 0;
+};
+
 /// Writes the files of a picture row by row. Each is published whole or not at all.
 class PictureFiles {
  public:
@@ -35,13 +48,14 @@ class PictureFiles {
   /// @param targets   must outlive this
   /// @param window    that the files hold; a .png is that large
   /// @param layers    of each .exr
+  /// @param text      in the header of each .exr
   /// @param display    how a .png of light is shown; occlusion and albedo stay. Empty: chosen by
   ///                   the beauty of the whole picture, for all layers alike
   /// @param directory  of the temporary files of pictures whose display is chosen
   /// @throws std::system_error
   PictureFiles(std::span<const PictureTarget> targets, const ImageWindow& window,
-               const std::vector<ExrLayerType>& layers, std::optional<Display> display,
-               const std::filesystem::path& directory);
+               const std::vector<ExrLayerType>& layers, const ExrText& text,
+               std::optional<Display> display, const std::filesystem::path& directory);
 
   /// Writes the next rows, from the top of the picture down.
   /// @param film  has the layers
@@ -58,14 +72,17 @@ class PictureFiles {
                                            std::span<const ExrLayerType> layers);
 
  private:
-  /// Shows the light of a whole picture.
-  void show(Spool<glm::vec3>& light, const Display& display, PngWriter& png) const;
+  /// Writes a whole picture whose rows are shown when all of them are known.
+  void write_all(Spool<glm::vec3>& waiting, PngWriter& png,
+                 const std::function<void(std::span<glm::vec3> row)>& show) const;
 
   std::span<const PictureTarget> targets_;
   unsigned width_;
   std::optional<Display> display_;
   ExposureMeter meter_;  ///< of the beauty, if the display is chosen
-  /// For each target, its light until the display is known; null where that is not awaited.
+  DepthRange depths_;
+  /// For each target, its light until the display is known, or its depth until the farthest is
+  /// known; null where neither is awaited.
   std::vector<std::unique_ptr<Spool<glm::vec3>>> waiting_;
   std::vector<std::unique_ptr<ExrWriter>> exrs_;  ///< for each target; null for a .png
   std::vector<std::unique_ptr<PngWriter>> pngs_;  ///< for each target; null for an .exr

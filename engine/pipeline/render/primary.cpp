@@ -25,6 +25,7 @@ class MeshView : public PrimaryView {
         light_(light),
         sampling_(sampling),
         camera_(camera),
+        forward_(axes_of(camera).forward),
         side_(side),
         lift_(lift) {}
 
@@ -35,8 +36,10 @@ class MeshView : public PrimaryView {
     const auto hit =
         scene_.closest(camera_.position, direction, 0, std::numeric_limits<double>::infinity());
     if (!hit) return std::nullopt;
-    return seen_of_mesh(scene_, light_, sampling_, *hit, direction, lift_,
-                        std::uint64_t{y} << 32 | x);
+    PrimaryHit seen =
+        seen_of_mesh(scene_, light_, sampling_, *hit, direction, lift_, std::uint64_t{y} << 32 | x);
+    seen.depth = static_cast<float>(hit->distance * glm::dot(glm::dvec3(direction), forward_));
+    return seen;
   }
 
  private:
@@ -44,6 +47,7 @@ class MeshView : public PrimaryView {
   const DirectLight& light_;
   LightSampling sampling_;
   Camera camera_;
+  glm::dvec3 forward_;
   unsigned side_;
   float lift_;
 };
@@ -64,7 +68,8 @@ PrimaryHit seen_of_mesh(const RayScene& scene, const DirectLight& light,
                      .normal = at.normal * turn,
                      .lift = lift,
                      .offset_normal = at.geometric_normal * turn,
-                     .albedo = at.albedo};
+                     .albedo = at.albedo,
+                     .triangle = at.triangle};
   primary.lamps = light.irradiance(primary.surface, primary.normal, sampling, seed).local;
   primary.direct = primary.albedo * primary.lamps * std::numbers::inv_pi_v<float>;
   if (at.front) primary.direct += at.emission;

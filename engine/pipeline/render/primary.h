@@ -49,6 +49,11 @@ struct PrimaryHit {
   /// Irradiance of the lamps on a mesh, and of emitters that are asked for it, W/m^2.
   glm::vec3 lamps{0};
   bool is_margin = false;  ///< true where a texture shows the surface next to it
+  float depth = 0;         ///< from the camera along its view, scene units; unused by what is baked
+  /// Index in Mesh::triangles; kNoTriangle of a surfel.
+  std::uint32_t triangle = kNoTriangle;
+
+  static constexpr std::uint32_t kNoTriangle = 0xffffffff;
 };
 
 /// A rectangle of the grid of samples of a picture.

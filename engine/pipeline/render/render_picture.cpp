@@ -18,6 +18,7 @@
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/frame_cameras.h"
 #include "engine/pipeline/render/picture_checks.h"
+#include "engine/pipeline/render/picture_layers.h"
 #include "engine/pipeline/render/shots.h"
 #include "engine/pipeline/render/subject.h"
 #include "engine/pipeline/render/tile_renderer.h"
@@ -29,7 +30,7 @@ namespace ptc {
 namespace {
 
 // Bytes of a pixel of a tile (hit, receiver, result, order), and of what estimates add to it
-constexpr std::uint64_t kReceiverBytes = 336;
+constexpr std::uint64_t kReceiverBytes = 344;
 constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);
 
 /// What a run renders of a request.
@@ -40,21 +41,6 @@ struct Part {
   std::optional<Moment> moment;  ///< that is seen of a scene that moves
 };
 
-FilmExtras extras_of(const RenderRequest& request) {
-  FilmExtras extras{.estimates = request.estimate,
-                    .glossy = request.glossy.roughness.has_value(),
-                    .irradiance = request.bakes()};
-  for (const std::string& group : request.shadows) extras.shadows.push_back(shadow_channel(group));
-  return extras;
-}
-
-/// Returns what an .exr says of the layers of films.
-std::vector<ExrLayerType> layer_types(const Film& film) {
-  std::vector<ExrLayerType> types;
-  for (const Film::Layer& layer : film.layers()) types.push_back(layer.type);
-  return types;
-}
-
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
 /// @param view  of the surfels, if the subject has no mesh
 MemoryBudget picture_budget(const RenderRequest& request, std::span<const PictureTarget> targets,
@@ -64,7 +50,11 @@ MemoryBudget picture_budget(const RenderRequest& request, std::span<const Pictur
   const std::uint64_t receiver =
       kReceiverBytes + (request.estimate ? kEstimateBytes : 0) + (glossy ? sizeof(Reflection) : 0);
   budget.charge("a tile", TileRenderer::kSamplesAtOnce * receiver);
-  const FilmExtras extras = extras_of(request);
+  const FilmExtras extras = extras_of(request, targets, subject.ids.has_value());
+  if (subject.ids) {
+    budget.charge("the names of objects", 3 * subject.ids->bytes());
+    budget.charge("objects of a tile", TileRenderer::kSamplesAtOnce * 2 * IdVotes::kSlotBytes);
+  }
   const ImageWindow& window = subject.window;
   const unsigned rows =
       std::min(window.height, TileRenderer::tile_of(window.width, subject.side).height);
@@ -107,6 +97,10 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   auto of_files = cameras_of_files(request, lighting.scene());
   load_subject(subject, request, part.moment, part.emission, lighting.scene(), lights.sky,
                targets.front().path, progress);
+  if (has_ids(request, targets)) {
+    require_ids(targets, subject.has_mesh());
+    if (subject.has_mesh()) subject.ids.emplace(subject.mesh);
+  }
   const std::vector<Camera> cameras =
       cameras_of_frames(request, lighting.scene(), of_files, subject, kept);
   of_files.reset();
@@ -167,10 +161,11 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
                     .side = subject.side,
                     .view = *subject.view,
                     .window = subject.window,
-                    .sky = !request.bakes()},
+                    .sky = !request.bakes(),
+                    .ids = subject.ids ? &*subject.ids : nullptr},
                    subject.shadows, request.light_sampling.sun_rays, lights.sky, lighting)
           .render_all(
-              extras_of(request),
+              extras_of(request, targets, subject.ids.has_value()),
               [&](const Film& rows, unsigned first) { done(rows, first, subject, i); }, progress);
     }
   }
@@ -210,7 +205,9 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
                   mesh_limits(request, rig.sky, targets.front().path), silent, "meshes")
           .mesh.emits();
   const std::vector<std::string> groups = groups_of(request, rig, emits);
-  const std::uint64_t sum_bytes = Film::pixel_bytes({}) + groups.size() * Film::kGroupBytes;
+  const std::uint64_t sum_bytes =
+      Film::pixel_bytes(extras_of(request, targets, has_ids(request, targets))) +
+      groups.size() * Film::kGroupBytes;
 
   // Light the scene for each group
   LightingReport report;
@@ -236,6 +233,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     }
     std::unique_ptr<Film> sum;
     ImageWindow window;
+    ExrText text;
     LightingReport of_picture;
     for (std::size_t i = 0; i < groups.size(); ++i) {
       one.lights = only_group(rig, groups[i]);
@@ -243,7 +241,9 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
       const auto add = [&](const Film& rows, unsigned first, const Subject& subject, std::size_t) {
         if (!sum) {
           window = subject.window;
-          sum = std::make_unique<Film>(window.width, window.height, FilmExtras{});
+          if (subject.ids) text = subject.ids->text();
+          sum = std::make_unique<Film>(window.width, window.height,
+                                       extras_of(one, targets, subject.ids.has_value()));
         }
         sum->add_group(group_channel(groups[i]), rows, first);
       };
@@ -252,7 +252,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
                 render_part(one, targets, part, kept, add, frame == 0 ? progress : silent));
     }
     add_run(report, of_picture);
-    PictureFiles files(of_frame, window, layer_types(*sum), kept.display,
+    PictureFiles files(of_frame, window, layer_types(*sum), text, kept.display,
                        roomiest_temp_dir(request.run, targets.front().path));
     files.write(*sum);
     keep_display(files.publish(), kept, report);
@@ -270,7 +270,8 @@ LightingReport render_files(const RenderRequest& request, std::span<const Pictur
                          std::size_t frame) {
     if (first == 0) {
       if (request.sequence) of_frame = targets_of_frame(targets, request.sequence->frames[frame]);
-      files.emplace(of_frame, subject.window, layer_types(rows), kept.display,
+      files.emplace(of_frame, subject.window, layer_types(rows),
+                    subject.ids ? subject.ids->text() : ExrText{}, kept.display,
                     roomiest_temp_dir(request.run, targets.front().path));
     }
     files->write(rows);

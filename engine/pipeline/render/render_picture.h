@@ -97,7 +97,12 @@ struct RenderRequest : LightingRequest {
 ///   occlusion          1   cosine-weighted share of the hemisphere that is covered, 0 to 1
 ///   bent_normal        3   mean of the uncovered directions
 ///   albedo             3   reflected share of the light, 0 to 1
-///   alpha              1   share of the samples that meet a surface
+///   A                  1   share of the samples that meet a surface
+///   Z                  1   depth along the view, scene units; kNoDepth where no surface is seen
+///   P                  3   position of the surface, scene units
+///   N                  3   shading normal, unit, turned towards the camera
+///   object_id          1   number of the object (SurfaceIds); 0 where no surface is seen
+///   material_id        1   number of the material
 ///   occlusion_error    1   only with LightingRequest::estimate
 ///   irradiance_error   1   only with LightingRequest::estimate, W / m^2
 ///   reflection         3   only with LightingRequest::glossy, W / (m^2 sr)
@@ -109,9 +114,11 @@ struct RenderRequest : LightingRequest {
 ///                          all is the beauty
 ///
 /// An .exr gets all layers, a .png one of them, and a .ply or .glb of vertices what VertexFiles
-/// says. Each layer is the mean over the samples of a pixel, except that `alpha` of a texture
-/// leaves out its margin, and that the layers of estimates are root mean squares, which are upper
-/// bounds on the error of that mean. Each file is published whole or not at all.
+/// says. Each layer is the mean over the samples of a pixel, except that `A` of a texture leaves
+/// out its margin, and that the layers of estimates are root mean squares, which are upper bounds
+/// on the error of that mean. Z, P and N are those of the nearest sample; the numbers are those of
+/// most samples that meet a surface (IdVotes). What is baked has no Z, P and N, surfels and
+/// vertices have no numbers. Each file is published whole or not at all.
 /// @param targets   one or more files, all from one rendering, or for each frame of a sequence
 /// @param progress  gets the stages, and notes about the meshes and the scene's record
 /// @return          what the run did, cost and, if asked for, how exact it was

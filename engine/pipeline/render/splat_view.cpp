@@ -169,7 +169,8 @@ std::optional<PrimaryHit> SplatView::at(unsigned x, unsigned y) const {
                  .lift = lift_height(decode_ufloat16(s.payload.radius),
                                      std::max(lift_, 0.125F * s.payload.rise), frame_),
                  .offset_normal = normal,
-                 .sky_included = sky_included_ && !back};
+                 .sky_included = sky_included_ && !back,
+                 .depth = static_cast<float>(depth)};
   for (int c = 0; c < 3; ++c) {
     hit.albedo[c] = static_cast<float>(s.payload.albedo[static_cast<std::size_t>(c)]) / 255;
   }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "engine/base/progress.h"
@@ -12,6 +13,7 @@
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/render/render_picture.h"
+#include "engine/pipeline/render/surface_ids.h"
 #include "engine/pipeline/render/texture_tiles.h"
 #include "engine/pipeline/render/tile_renderer.h"
 
@@ -21,9 +23,10 @@ namespace ptc {
 /// other members.
 struct Subject {
   Camera camera;
-  ImageWindow window;  ///< of the camera's picture that is rendered
-  unsigned side = 1;   ///< samples of a pixel lie on a grid of side x side
-  Mesh mesh;           ///< empty: the camera sees the surfels
+  ImageWindow window;             ///< of the camera's picture that is rendered
+  unsigned side = 1;              ///< samples of a pixel lie on a grid of side x side
+  Mesh mesh;                      ///< empty: the camera sees the surfels
+  std::optional<SurfaceIds> ids;  ///< of the mesh, where the picture shows them
   std::unique_ptr<RayScene> rays;
   std::unique_ptr<DirectLight> light;
   LightSampling sampling;  ///< shadow rays at a mesh

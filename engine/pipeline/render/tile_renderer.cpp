@@ -12,6 +12,8 @@
 
 #include <algorithm>
 
+#include <glm/geometric.hpp>
+
 namespace ptc {
 
 Receiver receiver_at(const PrimaryHit& hit) {
@@ -51,8 +53,13 @@ void TileRenderer::render_all(const FilmExtras& extras, const RowsDone& done, Pr
     for (unsigned x = 0; x < window.width; x += whole.width) {
       const Tile tile{window.x + x, window.y + y, std::min(window.width - x, whole.width),
                       film.height()};
+      if (extras.ids) {
+        objects_.begin(tile.pixels(), samples);
+        materials_.begin(tile.pixels(), samples);
+      }
       for (unsigned first = 0; first < samples; first += at_once)
         render(tile, first, std::min(at_once, samples - first), film, progress);
+      if (extras.ids) set_ids(tile, film);
     }
     film.finish();
     done(film, y);
@@ -115,24 +122,50 @@ void TileRenderer::expose(const Tile& tile, unsigned first, const LitReceivers& 
   const float weight = 1.0f / static_cast<float>(side * side);
   const float scale = 1.0f / static_cast<float>(side);
   const std::size_t groups = receivers_.empty() ? 0 : lit.shadows.size() / receivers_.size();
+  const glm::dvec3 forward = axes_of(seen_.camera).forward;
   std::size_t next = 0;
   for (std::size_t i = 0; i < hits_.size(); ++i) {
     const std::size_t place = i % tile.pixels();
     const unsigned x = tile.x0 + static_cast<unsigned>(place % tile.width);
     const unsigned y = tile.y0 + static_cast<unsigned>(place / tile.width);
     const std::size_t pixel = std::size_t{y - tile.y0} * film.width() + (x - seen_.window.x);
+    const auto direction = [&] {
+      const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
+      const auto [sx, sy] = sample_at(x, y, sample, side);
+      return seen_.camera.direction((static_cast<float>(sx) + 0.5f) * scale,
+                                    (static_cast<float>(sy) + 0.5f) * scale);
+    };
     if (hits_[i]) {
+      if (film.has_surfaces()) {
+        const glm::dvec3 along = direction();
+        const double way = hits_[i]->depth / glm::dot(along, forward);
+        film.add(pixel, {.depth = hits_[i]->depth,
+                         .position = glm::vec3(seen_.camera.position + along * way),
+                         .normal = hits_[i]->normal});
+      }
+      if (seen_.ids != nullptr) count_ids(place, hits_[i]->triangle);
       if (!lit.estimates.empty()) film.add(pixel, lit.estimates[next], weight);
       if (!lit.reflections.empty()) film.add(pixel, lit.reflections[next], weight);
       film.add(pixel, lit.shadows.subspan(next * groups, groups), weight);
       film.add(pixel, *hits_[i], lit.shading[next++], weight);
     } else if (seen_.sky) {
-      const unsigned sample = first + static_cast<unsigned>(i / tile.pixels());
-      const auto [sx, sy] = sample_at(x, y, sample, side);
-      const glm::vec3 direction = seen_.camera.direction((static_cast<float>(sx) + 0.5f) * scale,
-                                                         (static_cast<float>(sy) + 0.5f) * scale);
-      film.add_sky(pixel, sky_.at(direction), weight);
+      film.add_sky(pixel, sky_.at(direction()), weight);
     }
+  }
+}
+
+void TileRenderer::count_ids(std::size_t place, std::uint32_t triangle) {
+  const SurfaceId id = seen_.ids->at(triangle);
+  objects_.add(place, id.object);
+  materials_.add(place, id.material);
+}
+
+/// Writes the numbers of a complete tile.
+void TileRenderer::set_ids(const Tile& tile, Film& film) const {
+  for (std::size_t place = 0; place < tile.pixels(); ++place) {
+    const std::size_t x = tile.x0 - seen_.window.x + place % tile.width;
+    film.set_ids(place / tile.width * film.width() + x,
+                 {objects_.winner(place), materials_.winner(place)});
   }
 }
 

@@ -16,6 +16,7 @@
 #include "engine/pipeline/light/lighting.h"
 #include "engine/pipeline/render/film.h"
 #include "engine/pipeline/render/primary.h"
+#include "engine/pipeline/render/surface_ids.h"
 #include "engine/scene/camera.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -29,6 +30,8 @@ struct SeenThrough {
   PrimaryView& view;
   ImageWindow window;  ///< of its picture that is rendered
   bool sky = true;     ///< whether samples that meet nothing show the sky, and else stay black
+  /// Numbers of the objects and materials of the mesh; null: the films have none.
+  const SurfaceIds* ids = nullptr;
 };
 
 /// The shadows of groups of lights that a picture shows: those of a mesh or those of surfels, or
@@ -84,7 +87,7 @@ class TileRenderer {
       : seen_(seen), casters_(shadows), sun_rays_(sun_rays), sky_(sky), lighting_(lighting) {}
 
   /// Renders all samples, one row of tiles after another.
-  /// @param extras    of the films
+  /// @param extras    of the films; has ids if SeenThrough has
   /// @param done      gets each row of tiles, from the top of the window down
   /// @param progress  advances by one for each sample
   /// @throws as Lighting::shade(), and what `done` throws
@@ -95,6 +98,8 @@ class TileRenderer {
   void find_hits(const Tile& tile, unsigned first, unsigned count);
   [[nodiscard]] std::span<const float> find_shadows();
   void expose(const Tile& tile, unsigned first, const LitReceivers& lit, Film& film);
+  void count_ids(std::size_t place, std::uint32_t triangle);
+  void set_ids(const Tile& tile, Film& film) const;
 
   SeenThrough seen_;
   const PictureShadows& casters_;
@@ -104,7 +109,8 @@ class TileRenderer {
   std::vector<std::optional<PrimaryHit>> hits_;
   std::vector<Receiver> receivers_;
   std::vector<float> shadows_;
-  std::uint64_t seed_ = 0;  ///< hits whose shadows were found
+  IdVotes objects_, materials_;  ///< of the pixels of a tile
+  std::uint64_t seed_ = 0;       ///< hits whose shadows were found
 };
 
 }  // namespace ptc

@@ -268,7 +268,7 @@ void VertexFiles::write(const Film& film) {
   if (!has_ply_) return;
   layers_.clear();
   std::vector<Film::Layer> layers = film.layers();
-  std::erase_if(layers, [](const Film::Layer& layer) { return layer.type.name == "alpha"; });
+  std::erase_if(layers, [](const Film::Layer& layer) { return layer.type.name == "A"; });
   for (const Film::Layer& layer : layers) layers_.push_back(layer.type);
   for (std::size_t i = 0; i < count; ++i) {
     for (const Film::Layer& layer : layers) {
