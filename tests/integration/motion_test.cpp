@@ -246,6 +246,40 @@ TEST_CASE("motion: a box in which something moves has an inside", "[integration]
   CHECK(scene.progress.count == 6);  // the sides change with each frame
 }
 
+TEST_CASE("motion: of a glTF, nodes that an animation moves are sampled for each moment",
+          "[integration][motion]") {
+  Scene scene;
+  // A square that faces up, on the ground and small above it, where it moves along x for 4 seconds
+  const std::array<float, 18> corners{-1, 0, -1, -1, 0, 1, 1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
+  const std::array<float, 8> keys{0, 4, -0.5F, 0.3F, 0, 0.5F, 0.3F, 0};
+  scene.dir.file("a.bin", std::string(reinterpret_cast<const char*>(corners.data()), 72) +
+                              std::string(reinterpret_cast<const char*>(keys.data()), 32));
+  scene.request.inputs = {scene.dir.file("a.gltf", R"({"asset": {"version": "2.0"},
+    "scenes": [{"nodes": [0, 1]}],
+    "nodes": [{"mesh": 0}, {"mesh": 0, "translation": [-0.5, 0.3, 0], "scale": [0.3, 0.3, 0.3]}],
+    "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+    "buffers": [{"uri": "a.bin", "byteLength": 104}],
+    "bufferViews": [{"buffer": 0, "byteLength": 72},
+                    {"buffer": 0, "byteOffset": 72, "byteLength": 8},
+                    {"buffer": 0, "byteOffset": 80, "byteLength": 24}],
+    "accessors": [
+      {"bufferView": 0, "componentType": 5126, "count": 6, "type": "VEC3",
+       "min": [-1, 0, -1], "max": [1, 0, 1]},
+      {"bufferView": 1, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [4]},
+      {"bufferView": 2, "componentType": 5126, "count": 2, "type": "VEC3"}],
+    "animations": [{"samplers": [{"input": 1, "output": 2}],
+      "channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]}]})")};
+  for (const double seconds : {0.0, 3.0}) {
+    scene.request.moment = Moment{.seconds = seconds};
+    build_container(scene.request, scene.path("whole.ptcx"), scene.progress);
+    scene.moving.build(scene.request, scene.path("parts.ptcx"), scene.progress);
+    INFO("at " << seconds << " s");
+    CHECK(difference(floor_light(scene.path("parts.ptcx")), floor_light(scene.path("whole.ptcx"))) <
+          0.03);
+  }
+  CHECK(scene.progress.count == 1);
+}
+
 TEST_CASE("motion: scenes without parts are built as a whole", "[integration][motion]") {
   Scene scene;
   SECTION("everything moves") {
