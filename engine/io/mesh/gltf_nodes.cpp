@@ -29,10 +29,11 @@ constexpr char kInstancing[] = "EXT_mesh_gpu_instancing";
 
 class NodeWalk {
  public:
-  NodeWalk(GltfDocument& document, GltfSearch search, std::optional<double> seconds,
+  NodeWalk(GltfDocument& document, GltfSearch search, std::optional<double> seconds, Motion part,
            std::uint64_t memory_bytes, MeshWarnings& warnings)
       : document_(document),
         search_(search),
+        part_(part),
         animation_(document, seconds, warnings),
         memory_bytes_(memory_bytes),
         warnings_(warnings),
@@ -151,7 +152,8 @@ class NodeWalk {
         add_camera(*camera, node, world);
       const bool shows = node.contains("mesh") || GltfDocument::extension(node, kLights) != nullptr;
       found_.moves_mesh |= moves && shows;
-      if (search_ == GltfSearch::all) add_shown(index, node, world);
+      const bool wanted = part_ == Motion::any || moves == (part_ == Motion::moving);
+      if (search_ == GltfSearch::all && wanted) add_shown(index, node, world);
       push(node_list(node, "children"), world, moves);
     }
   }
@@ -245,6 +247,7 @@ class NodeWalk {
 
   GltfDocument& document_;
   GltfSearch search_;
+  Motion part_;
   GltfAnimation animation_;
   std::uint64_t memory_bytes_;
   MeshWarnings& warnings_;
@@ -256,8 +259,8 @@ class NodeWalk {
 }  // namespace
 
 GltfNodes walk_gltf_nodes(GltfDocument& document, GltfSearch search, std::optional<double> seconds,
-                          std::uint64_t memory_bytes, MeshWarnings& warnings) {
-  return NodeWalk(document, search, seconds, memory_bytes, warnings).walk();
+                          Motion part, std::uint64_t memory_bytes, MeshWarnings& warnings) {
+  return NodeWalk(document, search, seconds, part, memory_bytes, warnings).walk();
 }
 
 }  // namespace ptc

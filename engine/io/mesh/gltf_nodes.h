@@ -34,11 +34,12 @@ enum class GltfSearch : std::uint8_t { all, cameras };
 /// Walks through the nodes, and through the instances that they show.
 /// @param search        with `cameras` there are no uses and no lights, nor are they checked
 /// @param seconds       time at which animations are shown, as MeshRoom::seconds
+/// @param part          which nodes show their meshes and lights
 /// @param memory_bytes  cap on the memory of the uses, and of what comes of them
 /// @param warnings      receives cameras, lights and animations that are left out
 /// @throws DataError when a node breaks a rule; LimitError for more instances than memory holds
 [[nodiscard]] GltfNodes walk_gltf_nodes(GltfDocument& document, GltfSearch search,
-                                        std::optional<double> seconds, std::uint64_t memory_bytes,
-                                        MeshWarnings& warnings);
+                                        std::optional<double> seconds, Motion part,
+                                        std::uint64_t memory_bytes, MeshWarnings& warnings);
 
 }  // namespace ptc

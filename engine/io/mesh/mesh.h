@@ -127,6 +127,13 @@ struct MeshLight {
 
 class SpilledMesh;
 
+/// Parts of a scene, by whether they ever move.
+enum class Motion : std::uint8_t {
+  any,    ///< all of it
+  still,  ///< what stands in the same place at all times
+  moving  ///< the rest
+};
+
 /// The memory in which a mesh is read, and where one goes that takes more.
 struct MeshRoom {
   /// Cap on the memory while a mesh is read, bytes.
@@ -143,6 +150,8 @@ struct MeshRoom {
   /// Time at which the animations of a glTF are shown, finite, seconds; empty: its nodes stand as
   /// the file puts them.
   std::optional<double> seconds{};
+  /// Which nodes of a glTF show their meshes and lights. A part may have no triangle.
+  Motion part = Motion::any;
 };
 
 /// Where a mesh stands: an affine map of its positions to world positions. The first three columns

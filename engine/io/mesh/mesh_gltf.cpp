@@ -81,8 +81,8 @@ class GltfMesh {
   MeshFile read() {
     check_extensions();
     room_.memory_bytes -= std::min(room_.memory_bytes, document_.view_bytes());
-    GltfNodes nodes =
-        walk_gltf_nodes(document_, GltfSearch::all, room_.seconds, room_.memory_bytes, warnings_);
+    GltfNodes nodes = walk_gltf_nodes(document_, GltfSearch::all, room_.seconds, room_.part,
+                                      room_.memory_bytes, warnings_);
     uses_ = std::move(nodes.uses);
     reserve_decoding();
     std::vector<PlacedMesh> placed;
@@ -101,8 +101,8 @@ class GltfMesh {
     warn_of_extensions();
     MeshFile file;
     if (placed.empty() || !soup_.polygons.empty()) file = end_soup();
-    if (file.mesh.triangles.empty() && !file.spilled && placed.empty())
-      document_.fail("the mesh has no triangle");
+    const bool is_empty = file.mesh.triangles.empty() && !file.spilled && placed.empty();
+    if (is_empty && room_.part == Motion::any) document_.fail("the mesh has no triangle");
     file.placed = std::move(placed);
     file.cameras = std::move(nodes.cameras);
     file.warnings = warnings_.lines();
@@ -405,8 +405,8 @@ CameraFile read_gltf_cameras(const std::filesystem::path& path, std::optional<do
   return read_checked(path, [&] {
     GltfDocument document(path, memory_bytes);
     MeshWarnings warnings;  // read_mesh() tells them
-    GltfNodes nodes =
-        walk_gltf_nodes(document, GltfSearch::cameras, seconds, memory_bytes, warnings);
+    GltfNodes nodes = walk_gltf_nodes(document, GltfSearch::cameras, seconds, Motion::any,
+                                      memory_bytes, warnings);
     return CameraFile{std::move(nodes.cameras), nodes.moves_mesh, nodes.animation_seconds};
   });
 }

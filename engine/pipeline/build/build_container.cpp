@@ -44,6 +44,8 @@
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/resume.h"
 #include "engine/pipeline/build/scene_file.h"
+#include "engine/pipeline/build/scene_part.h"
+#include "engine/pipeline/build/still_light.h"
 #include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
@@ -89,14 +91,17 @@ struct SortedPoints {
   std::unique_ptr<AttributeSorts> attributes;
   std::uint64_t memory_bytes = 0;  ///< of the sort of points, which are free when it has ended
   BuildPlan plan;
+  std::unique_ptr<StillLight> still_light;  ///< of the points of the scene; null: they keep theirs
 };
 
 /// One build, from the request to the published container. run() is called once.
 class Build {
  public:
+  /// @param part  of a scene that is built; null: the whole
   Build(const BuildRequest& request, BoundsFrom from, const std::filesystem::path& target,
-        Progress& progress)
+        Progress& progress, ScenePart* part = nullptr)
       : request_(request),
+        part_(part),
         bounds_from_(from),
         target_(behind_links(target)),
         progress_(progress),
@@ -169,6 +174,7 @@ class Build {
     }
     scene_ = std::make_unique<ContainerReader>(with_directory_under(request_.append, request_.run));
     check_extensible(*scene_);
+    if (part_) return;
     // Keep the lights of the scene; without meshes to light, their sky picture is not loaded
     if (scene_->meta().text.contains(kLightsKey)) {
       request_.lights =
@@ -186,7 +192,17 @@ class Build {
     return scene_ ? scene_->superblock().points : 0;
   }
 
+  /// @throws IsOneWhole when what moves is too far away from what stands still
   [[nodiscard]] Frame frame_of(const Bounds& bounds) const {
+    if (!part_) return usual_frame_of(bounds);
+    try {
+      return usual_frame_of(bounds);
+    } catch (const RequestError& error) {
+      throw IsOneWhole(error.what());
+    }
+  }
+
+  [[nodiscard]] Frame usual_frame_of(const Bounds& bounds) const {
     if (bounds.empty()) return scene_->header().frame;
     const std::array<double, 3> low = to_array(bounds.low), high = to_array(bounds.high);
     return scene_points() > 0 ? grow_frame(scene_->header().frame, low, high)
@@ -195,7 +211,8 @@ class Build {
 
   /// Returns the record for the meta page. @param spacing  as for complete_record()
   [[nodiscard]] Meta record(const Meta& meta, double spacing) const {
-    return complete_record(meta, spacing, scene_ ? &scene_->meta() : nullptr, request_.page_shift);
+    return complete_record(meta, spacing, scene_ && !part_ ? &scene_->meta() : nullptr,
+                           request_.page_shift);
   }
 
   /// Estimates the number of pages of points and nodes. In a city there are some 5 pages of nodes
@@ -283,15 +300,18 @@ class Build {
   /// Feeds all inputs to a sort, which writes them to the disk when memory does not hold them.
   SortedPoints sort() {
     // Read and measure the inputs, choose the frame
-    BuildInputs inputs = read_inputs(request_, bounds_from_, scene_.get(), mesh_limits(),
-                                     report_.seconds, progress_);
+    BuildInputs inputs =
+        part_ ? read_part(request_, *part_, mesh_limits(), executor_, report_.seconds, progress_)
+              : read_inputs(request_, bounds_from_, scene_.get(), mesh_limits(), report_.seconds,
+                            progress_);
+    if (part_) request_.sampling.spacing = part_->spacing;
     report_.las_records = std::move(inputs.clouds.las_records);
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
       for (const auto& input : request_.inputs) names += input.string() + ": ";
       throw DataError(names + "the input has no points and no triangles");
     }
-    if (scene_) {
+    if (scene_ && !part_) {
       // What the scene says of its positions holds
       std::map<std::string, std::string> texts = scene_->meta().text, named_by;
       join_texts(texts, named_by, inputs.clouds.text, "what is appended", progress_);
@@ -357,8 +377,10 @@ class Build {
     const std::uint64_t places = inputs.streamed ? inputs.streamed->found.places() : 0;
     const bool by_spacing = inputs.has_meshes() && request_.sampling.spacing > 0;
     const std::uint64_t expected =
-        by_spacing ? 0
-                   : known + (inputs.has_meshes() ? std::max(request_.sampling.count, places) : 0);
+        part_ ? points_of(*inputs.lit)
+        : by_spacing
+            ? 0
+            : known + (inputs.has_meshes() ? std::max(request_.sampling.count, places) : 0);
     const std::size_t groups = inputs.attributes.groups();
     const AllSortOptions options =
         sort_options(std::move(budget), expected, points.plan.emits, groups);
@@ -376,7 +398,9 @@ class Build {
     // Feed the points, then plan the container: its record and its UUID depend on all of them
     double spacing = 0;
     {
-      const char* const name = inputs.lit        ? "sample and light"
+      const bool is_still = part_ && part_->motion == Motion::still;
+      const char* const name = is_still          ? "sample and light what stands still"
+                               : inputs.lit      ? "sample and light"
                                : inputs.streamed ? "sample"
                                                  : "partition";
       const Stage stage(report_.seconds, progress_, name, known, "points");
@@ -384,12 +408,21 @@ class Build {
       spacing = feed_inputs(inputs, request_, frame, scene_points(), room, *points.sorter,
                             *points.attributes, executor_, progress_);
     }
+    points.still_light = std::move(inputs.still_light);
     points.plan.meta = record(meta, spacing);
     check_meta(points.plan.meta, request_.page_shift, points.plan.point_bytes());
     points.plan.uuid = content_uuid(*points.sorter, *points.attributes, frame, request_,
                                     points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter, *points.attributes);
     return points;
+  }
+
+  /// Estimates the number of surfels that the spacing makes of a part of a scene.
+  [[nodiscard]] std::uint64_t points_of(const LitMesh& lit) const {
+    constexpr double kMost = 1e15;
+    const double spacing = request_.sampling.spacing;
+    return static_cast<std::uint64_t>(
+        std::min(kMost, sampled_area(lit.mesh, lit.first) / (spacing * spacing)));
   }
 
   /// Lets the points go into a temporary container first.
@@ -522,7 +555,9 @@ class Build {
     if (plan.scan) marks.emplace(roomiest_temp_dir(request_.run, target_));
     StreamChain chain(points.sorter->finish(needed(place.points)));
     if (plan.scan) complete(chain, points);
-    join(chain, plan.frame, [&] { return std::make_unique<ContainerPoints>(*scene_); });
+    join(
+        chain, plan.frame, [&] { return std::make_unique<ContainerPoints>(*scene_); },
+        points.still_light.get());
     if (marks) {
       chain.add(marks->tap(chain.last()));
       read_ahead_of(chain);
@@ -535,7 +570,7 @@ class Build {
     const Superblock superblock = build_from(chain.last(), writer, *points.sorter, needed);
     write_attributes(plan, *points.attributes, marks ? &*marks : nullptr, superblock.points,
                      writer);
-    if (superblock.points < all) {
+    if (superblock.points < all && !part_) {
       progress_.note(fmt::format("{} points lie where another one does and are left out",
                                  all - superblock.points));
     }
@@ -584,11 +619,14 @@ class Build {
 
   /// Adds the stages that merge sorted points with those of the scene and that drop duplicates.
   /// @param open_scene  returns the stream of the scene's points, in the frame of the scene
+  /// @param light       lights the points of the scene; null: they keep their light
   void join(StreamChain& chain, const Frame& frame,
-            const std::function<std::unique_ptr<PointStream>()>& open_scene) const {
+            const std::function<std::unique_ptr<PointStream>()>& open_scene,
+            const StillLight* light = nullptr) const {
     if (scene_) {
       PointStream& added = chain.last();
       chain.add(open_scene());
+      if (light) chain.add(light->light(chain.last(), scene_->header().frame, executor_));
       chain.add(move_points(chain.last(), scene_move(frame)));
       chain.add(merge_points(chain.last(), added));
     }
@@ -640,6 +678,7 @@ class Build {
   static std::uint64_t first_of_all(std::uint64_t /*point*/) { return 0; }
 
   BuildRequest request_;
+  ScenePart* const part_;
   const BoundsFrom bounds_from_;
   const std::filesystem::path target_;  ///< behind symbolic links
   Progress& progress_;
@@ -655,6 +694,11 @@ class Build {
 };
 
 }  // namespace
+
+BuildReport build_part(const BuildRequest& request, ScenePart& part,
+                       const std::filesystem::path& target, Progress& progress) {
+  return Build(request, BoundsFrom::points, target, progress, &part).run();
+}
 
 BuildReport build_container(const BuildRequest& request, const std::filesystem::path& target,
                             Progress& progress) {

@@ -47,28 +47,6 @@ void thin(std::vector<glm::dvec3>& sample) {
   sample.resize(sample.size() / 2);
 }
 
-/// Returns about kSampleKeys positions that are spread over a mesh by area, in scene units.
-std::vector<glm::dvec3> sample_triangles(const Mesh& mesh) {
-  const auto area = [&](const std::array<std::uint32_t, 3>& t) {
-    const glm::vec3& a = mesh.positions[t[0]];
-    return glm::length(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
-  };
-  double total = 0;
-  for (const auto& t : mesh.triangles) total += static_cast<double>(area(t));
-  const double step = total / static_cast<double>(kSampleKeys);
-  std::vector<glm::dvec3> sample;
-  double due = 0;     // area that was passed and has no position yet
-  double golden = 0;  // place in the triangle; multiples of the golden ratio spread evenly
-  for (const auto& t : mesh.triangles) {
-    for (due += static_cast<double>(area(t)); due > 0 && step > 0; due -= step) {
-      golden = std::fmod(golden + 0.618033988749895, 1.0);
-      const glm::dvec3 a(mesh.positions[t[0]]), b(mesh.positions[t[1]]), c(mesh.positions[t[2]]);
-      sample.push_back(mesh.origin + a + std::sqrt(golden) * 0.5 * ((b - a) + (c - a)));
-    }
-  }
-  return sample;
-}
-
 /// Returns a grid of 256 x 256 positions on the ground of the city, in scene units.
 std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   const glm::dvec3 extent = bounds.high - bounds.low;
@@ -345,7 +323,7 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
   }
   Mesh& mesh = meshes.mesh;
   inputs.bounds.add(mesh.bounds());
-  const std::vector<glm::dvec3> on_mesh = sample_triangles(mesh);
+  const std::vector<glm::dvec3> on_mesh = places_on(mesh);
   inputs.sample.insert(inputs.sample.end(), on_mesh.begin(), on_mesh.end());
   const Solids solids = find_solids(mesh);  // before the ray scene, so that their peaks do not add
   inputs.lit = std::make_unique<LitMesh>(std::move(mesh), solids, inputs.lights, inputs.relight);
@@ -354,6 +332,28 @@ BuildInputs read_files(const BuildRequest& request, BoundsFrom from, const Conta
 }
 
 }  // namespace
+
+std::vector<glm::dvec3> places_on(const Mesh& mesh, std::uint32_t first) {
+  const auto area = [&](const std::array<std::uint32_t, 3>& t) {
+    const glm::vec3& a = mesh.positions[t[0]];
+    return glm::length(glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
+  };
+  double total = 0;
+  const std::span triangles = std::span(mesh.triangles).subspan(first);
+  for (const auto& t : triangles) total += static_cast<double>(area(t));
+  const double step = total / static_cast<double>(kSampleKeys);
+  std::vector<glm::dvec3> sample;
+  double due = 0;     // area that was passed and has no position yet
+  double golden = 0;  // place in the triangle; multiples of the golden ratio spread evenly
+  for (const auto& t : triangles) {
+    for (due += static_cast<double>(area(t)); due > 0 && step > 0; due -= step) {
+      golden = std::fmod(golden + 0.618033988749895, 1.0);
+      const glm::dvec3 a(mesh.positions[t[0]]), b(mesh.positions[t[1]]), c(mesh.positions[t[2]]);
+      sample.push_back(mesh.origin + a + std::sqrt(golden) * 0.5 * ((b - a) + (c - a)));
+    }
+  }
+  return sample;
+}
 
 void Clouds::measure(const std::filesystem::path& path, const std::optional<Placement>& place,
                      const Selection& selection, BoundsFrom from, bool alone, Progress& progress) {
@@ -472,7 +472,16 @@ double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame
           with_spacing(sampling, seen_area(lit->light, lit->rays, sampling.lights, executor));
     }
     spacing = sampling.spacing;
-    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor, room.at_once));
+    sampling.keeps_dark = inputs.keeps_dark;
+    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor, room.at_once, lit->first));
+    if (lit->first > 0) {
+      const std::uint32_t moving = lit->first;
+      const LightRig lights = lit->light.rig();
+      Mesh mesh = std::move(inputs.lit->mesh);
+      inputs.lit.reset();
+      inputs.still_light =
+          std::make_unique<StillLight>(std::move(mesh), moving, lights, sampling.lights);
+    }
   }
   inputs.lit.reset();
   if (const StreamedMeshes* streamed = inputs.streamed.get()) {

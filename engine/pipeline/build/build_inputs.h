@@ -20,6 +20,7 @@
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/build/meshes.h"
+#include "engine/pipeline/build/still_light.h"
 #include "engine/scan/scan.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -108,6 +109,7 @@ struct LitMesh {
   Mesh mesh;
   RayScene rays;
   DirectLight light;
+  std::uint32_t first = 0;  ///< the first triangle that is sampled
 };
 
 /// Meshes that do not fit in memory, and what a survey found of them.
@@ -128,8 +130,11 @@ struct BuildInputs {
   /// Whether the points are lit once all of them are in the container, since not every one of them
   /// has the light of all lamps yet (spec/shading.md#mixed-light). Meshes then stay dark at first.
   bool relight = false;
+  bool keeps_dark = false;                   ///< as SamplingOptions
   std::unique_ptr<LitMesh> lit;              ///< null when no meshes are in memory
   std::unique_ptr<StreamedMeshes> streamed;  ///< null when no meshes are on the disk
+  /// The light of the still parts that these are added to, once these are fed; null without any.
+  std::unique_ptr<StillLight> still_light;
 
   [[nodiscard]] bool has_meshes() const noexcept { return lit || streamed; }
 };
@@ -144,6 +149,10 @@ struct BuildInputs {
 [[nodiscard]] BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from,
                                       const ContainerReader* scene, const MeshLimits& limits,
                                       StageSeconds& seconds, Progress& progress);
+
+/// Returns about 2^16 places that are spread over a mesh by area, scene units.
+/// @param first  the first triangle that counts
+[[nodiscard]] std::vector<glm::dvec3> places_on(const Mesh& mesh, std::uint32_t first = 0);
 
 /// What the sampling of meshes may use.
 struct SamplingRoom {

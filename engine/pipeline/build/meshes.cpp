@@ -106,6 +106,13 @@ bool any_file(const SceneObjects& scene, std::uint64_t memory_bytes, const auto&
   });
 }
 
+/// Says whether a part of an object may show something.
+bool has_part(const SceneObject& object, Motion part, std::uint64_t memory_bytes) {
+  if (part == Motion::any) return true;
+  if (object.moves || part == Motion::still) return object.moves == (part == Motion::moving);
+  return read_cameras(object.file, {}, memory_bytes).moves_mesh;
+}
+
 /// Collects meshes, and joins them when it is known that all fit.
 class Joiner {
  public:
@@ -124,7 +131,8 @@ class Joiner {
             .textures = textures_,
             .material = object.material,
             .one_sided = choice_.one_sided || object.one_sided,
-            .seconds = seconds_of(choice_.moment)};
+            .seconds = seconds_of(choice_.moment),
+            .part = object.moves ? Motion::any : choice_.part};
   }
   [[nodiscard]] TextureStore& textures() noexcept { return *textures_; }
 
@@ -152,6 +160,7 @@ class Joiner {
   [[nodiscard]] LoadedMeshes take() {
     if (apart_ || traced_ > limits_.traced) return take_apart();
     LoadedMeshes loaded;
+    loaded.traced_bytes = traced_;
     // The first mesh is taken over, so that a single one is never copied
     for (Entry& entry : entries_) {
       const std::vector<Placement>& places = entry.placed.places;
@@ -301,7 +310,7 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   const SceneObjects scene =
       read_scene_objects(inputs, &joiner.textures(), limits.reading, choice.moment);
   for (const SceneObject& object : scene.objects) {
-    if (holds_points(object.file)) continue;
+    if (holds_points(object.file) || !has_part(object, choice.part, limits.reading)) continue;
     MeshFile file = read_mesh(object.file, joiner.room(object));
     for (const std::string& warning : file.warnings) {
       progress.note(object.file.string() + ": " + warning);
@@ -311,7 +320,7 @@ LoadedMeshes load_meshes(const std::vector<std::filesystem::path>& inputs, const
   }
 
   // Add the mesh in memory and the backdrop
-  if (also) {
+  if (also && choice.part != Motion::moving) {
     check_mesh(*also);
     joiner.add(Mesh(*also));
   }

@@ -35,6 +35,9 @@ struct MeshChoice {
   /// When scenes that move are shown; empty: scene files at their first keys, and mesh files
   /// without their animations.
   std::optional<Moment> moment{};
+  /// Which of the objects of scene files, and of the nodes of mesh files, are loaded. The mesh in
+  /// memory stands still.
+  Motion part = Motion::any;
 };
 
 /// The meshes of a request.
@@ -43,6 +46,7 @@ struct LoadedMeshes {
               ///< them
   std::vector<MeshLight> lights;     ///< of the files, in their order
   std::unique_ptr<MeshParts> parts;  ///< all of them, where they do not fit in memory; else null
+  std::uint64_t traced_bytes = 0;    ///< what counts towards MeshLimits::traced
 
   [[nodiscard]] bool empty() const noexcept { return mesh.triangles.empty() && !parts; }
 };

@@ -215,7 +215,8 @@ class SceneReader {
       if (placements != nullptr) fields.fail("keys excludes placements");
       object.places.push_back(
           read_keys(fields, *keys, where, moment_ ? std::optional(moment_->frame) : std::nullopt));
-      scene_.moves |= keys->size() > 1;
+      object.moves = keys->size() > 1;
+      scene_.moves |= object.moves;
     } else if (placements == nullptr) {
       if (const auto place = read_place(fields)) object.places.push_back(*place);
     } else if (placements->is_string()) {
@@ -241,7 +242,7 @@ class SceneReader {
   /// that many objects name is read once.
   void add(SceneObject object, const std::string& material) {
     const auto [at, is_new] = known_.try_emplace(
-        std::tuple(object.file, material, object.one_sided), scene_.objects.size());
+        std::tuple(object.file, material, object.one_sided, object.moves), scene_.objects.size());
     if (is_new) {
       scene_.objects.push_back(std::move(object));
       return;
@@ -260,8 +261,9 @@ class SceneReader {
   SceneObjects& scene_;
   std::uint64_t places_ = 0;  ///< of all objects so far
   std::map<std::string, Material> materials_;
-  /// Index of an object by its file, the name of its material, and whether it is one-sided.
-  std::map<std::tuple<std::filesystem::path, std::string, bool>, std::size_t> known_;
+  /// Index of an object by its file, the name of its material, and whether it is one-sided and
+  /// moves.
+  std::map<std::tuple<std::filesystem::path, std::string, bool, bool>, std::size_t> known_;
 };
 
 /// Implements read_scene_objects().

@@ -22,6 +22,7 @@ struct SceneObject {
   std::vector<Placement> places;     ///< empty: it stands where its file says
   std::optional<Material> material;  ///< takes the place of those of a mesh
   bool one_sided = false;            ///< as for MeshRoom
+  bool moves = false;                ///< whether it has several keys
 };
 
 /// A moment of a sequence, at which scenes that move are shown.
@@ -43,7 +44,8 @@ struct SceneCamera {
 
 /// The content of scene files, and of other files beside them.
 struct SceneObjects {
-  /// In the order of the files; those of a scene file that differ in their places alone are one.
+  /// In the order of the files; those of a scene file that differ in their places alone are one,
+  /// but for those that move, which are another.
   std::vector<SceneObject> objects;
   std::optional<LightRig> lights;  ///< of the first file that has any; its sky's map is not read
   std::vector<std::filesystem::path> named;  ///< all files that scene files name

@@ -18,14 +18,15 @@ bool is_container_alone(const LightingRequest& request) {
 }
 
 BuiltScene::BuiltScene(const LightingRequest& request, BuildRequest build,
-                       const std::filesystem::path& target, Progress& progress)
+                       const std::filesystem::path& target, Progress& progress, MovingScene* moving)
     : path_(temporary_container_path(roomiest_temp_dir(request.run, target))), name_(path_) {
   build.inputs = scene_files(request);
   build.input_names = request.scene_names;
   build.sampling = request.sampling;
   build.up = request.up;
   build.run = request.run;
-  BuildReport report = build_container(build, path_, progress);
+  BuildReport report =
+      moving ? moving->build(build, path_, progress) : build_container(build, path_, progress);
   seconds_ = std::move(report.seconds);
   las_records_ = std::move(report.las_records);
 }

@@ -9,6 +9,7 @@
 #include "engine/base/progress.h"
 #include "engine/io/file/file.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/moving_scene.h"
 #include "engine/pipeline/light/lighting.h"
 
 namespace ptc {
@@ -29,9 +30,11 @@ class BuiltScene {
   ///                and the resources are taken from the request
   /// @param target  output of the run; its directory holds the container when the request names no
   ///                directories for temporary files
+  /// @param moving  builds it as a moment of a scene that moves; null: build_container() does
   /// @throws as build_container()
   BuiltScene(const LightingRequest& request, BuildRequest build,
-             const std::filesystem::path& target, Progress& progress);
+             const std::filesystem::path& target, Progress& progress,
+             MovingScene* moving = nullptr);
 
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// BuildReport::las_records of the build.

@@ -334,17 +334,18 @@ LightingReport render_container(const RenderRequest& request,
 /// Builds a temporary container of clouds and meshes, and renders it. The camera sees meshes as
 /// they are, unless there are clouds beside them.
 /// @param moment  as for render_container()
+/// @param moving  builds the container of a scene that moves; null: the scene stands still
 LightingReport render_files_of_scene(const RenderRequest& request,
                                      std::span<const PictureTarget> targets,
-                                     const std::optional<Moment>& moment, Continuity& kept,
-                                     Progress& progress) {
+                                     const std::optional<Moment>& moment, MovingScene* moving,
+                                     Continuity& kept, Progress& progress) {
   const BuiltScene scene(request,
                          {.backdrop = request.backdrop,
                           .one_sided = request.one_sided,
                           .moment = moment,
                           .lights = request.lights,
                           .note_lost_records = false},
-                         targets.front().path, progress);
+                         targets.front().path, progress, moving);
   RenderRequest rendering = request;
   rendering.scene = scene.path();
   rendering.joined.clear();
@@ -360,16 +361,19 @@ LightingReport render_files_of_scene(const RenderRequest& request,
   return report;
 }
 
-/// Renders the frames of a scene that moves, each from a container of its own.
+/// Renders the frames of a scene that moves, each from a container of its own; or the picture of
+/// the scene at rest.
 LightingReport render_moving(const RenderRequest& request, std::span<const PictureTarget> targets,
                              Continuity& kept, Progress& progress) {
+  MovingScene scene(roomiest_temp_dir(request.run, targets.front().path));
+  if (!request.sequence) return render_files_of_scene(request, targets, {}, &scene, kept, progress);
   LightingReport report;
   RenderRequest one = request;
   for (std::size_t i = 0; i < request.sequence->frames.count(); ++i) {
     const std::int64_t frame = request.sequence->frames[i];
     one.sequence->frames = {frame, frame};
-    add_run(report,
-            render_files_of_scene(one, targets, moment_of(*request.sequence, i), kept, progress));
+    add_run(report, render_files_of_scene(one, targets, moment_of(*request.sequence, i), &scene,
+                                          kept, progress));
   }
   return report;
 }
@@ -381,10 +385,10 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   check_request(request, targets);
   Continuity kept = continuity_of(request);
   const auto move = [&](const std::vector<std::filesystem::path>& files) {
-    return request.sequence && objects_move(files, request.run.memory_bytes);
+    return objects_move(files, request.run.memory_bytes);
   };
   if (is_container_alone(request)) {
-    if (move(request.meshes)) {
+    if (request.sequence && move(request.meshes)) {
       progress.note(
           "the meshes move, but the container does not: all frames show both as they stand. Name "
           "the meshes in place of the container");
@@ -395,7 +399,7 @@ LightingReport render_picture(const RenderRequest& request, std::span<const Pict
   std::vector<std::filesystem::path> files = scene_files(request);
   files.insert(files.end(), request.meshes.begin(), request.meshes.end());
   if (move(files)) return render_moving(request, targets, kept, progress);
-  return render_files_of_scene(request, targets, {}, kept, progress);
+  return render_files_of_scene(request, targets, {}, nullptr, kept, progress);
 }
 
 }  // namespace ptc

@@ -70,20 +70,19 @@ DirectLight::Sums DirectLight::from_lights(const Place& at, const LightSampling&
   rays_.draw(at.position, at.normal, sampling, at.seed, 0, rays);
   Sums sums;
   for (const LightRay& ray : rays) {
-    // End a ray a little before its emitter, as it begins a little off the receiver
-    const bool hidden =
-        ray.ends ? is_hidden(at, ray.end + 2 * scene_.epsilon() * glm::dvec3(ray.end_normal))
-                 : scene_.occluded(at.origin, ray.direction, 0, kFar);
     sums.open += ray.irradiance;
-    if (!hidden) sums.arrives += ray.irradiance;
+    if (!is_hidden(scene_, at, ray)) sums.arrives += ray.irradiance;
   }
   return sums;
 }
 
-bool DirectLight::is_hidden(const Place& at, const glm::dvec3& end) const {
+bool DirectLight::is_hidden(const RayScene& by, const Place& at, const LightRay& ray) const {
+  if (!ray.ends) return by.occluded(at.origin, ray.direction, 0, kFar);
+  // End a ray a little before its emitter, as it begins a little off the receiver
+  const glm::dvec3 end = ray.end + 2 * scene_.epsilon() * glm::dvec3(ray.end_normal);
   const glm::dvec3 offset = end - at.origin;
   const double distance = glm::length(offset);
-  return distance > 0 && scene_.occluded(at.origin, glm::vec3(offset / distance), 0, distance);
+  return distance > 0 && by.occluded(at.origin, glm::vec3(offset / distance), 0, distance);
 }
 
 // Sums up the light of rays from one place, which are traced as many at once as RayScene takes.
@@ -123,38 +122,88 @@ class DirectLight::OpenRays {
 // Weighs a ray by the balance heuristic: L cos over the sum of all densities that could have
 // brought its direction, each times its number of rays (Veach and Guibas 1995). So a direction that
 // both samplings may bring does not count twice.
+template <class Take>
 void DirectLight::add_sky_ray(const Place& at, const glm::vec3& direction, float cosine_rays,
-                              float map_rays, float map_density, OpenRays& rays) const {
+                              float map_rays, float map_density, const Take& take) const {
   const float cosine = glm::dot(at.normal, direction);
   if (cosine <= 0) return;
   const glm::vec3 light = rays_.rig().sky.at(direction);
   if (!is_lit(light)) return;
-  rays.add(direction, light * (cosine / (cosine_rays * cosine / kPi + map_rays * map_density)));
+  take(direction, light * (cosine / (cosine_rays * cosine / kPi + map_rays * map_density)));
 }
 
-glm::vec3 DirectLight::from_sky(const Place& at, unsigned rays) const {
+// Calls take(direction, light) for each ray to the sky, with what it brings when nothing is in the
+// way.
+template <class Take>
+void DirectLight::draw_sky(const Place& at, unsigned rays, const Take& take) const {
   // Divide the rays among the two densities.
-  if (sky_is_black_ || rays == 0) return glm::vec3(0);
+  if (sky_is_black_ || rays == 0) return;
   const unsigned map_rays = sky_density_ ? rays / 2 : 0;
   const unsigned cosine_rays = rays - map_rays;
   const auto by_cosine = static_cast<float>(cosine_rays);
   const auto by_map = static_cast<float>(map_rays);
   const Basis frame(at.normal);
-  OpenRays open(scene_, at);
   // Add rays by the cosine.
   const SquarePoints hemisphere = light_points(at.seed, LightKind::sky);
   for (std::uint32_t i = 0; i < cosine_rays; ++i) {
     const glm::vec3 direction = frame.to_world(cosine_direction(hemisphere.square(i)));
     const float density = map_rays > 0 ? sky_density_->density(direction) : 0;
-    add_sky_ray(at, direction, by_cosine, by_map, density, open);
+    add_sky_ray(at, direction, by_cosine, by_map, density, take);
   }
   // Add rays by the brightness of the map.
   const SquarePoints map = light_points(at.seed, LightKind::sky_map);
   for (std::uint32_t i = 0; i < map_rays; ++i) {
     const SkyDensity::Sample sample = sky_density_->sample(map.square(i));
-    add_sky_ray(at, sample.direction, by_cosine, by_map, sample.density, open);
+    add_sky_ray(at, sample.direction, by_cosine, by_map, sample.density, take);
   }
+}
+
+glm::vec3 DirectLight::from_sky(const Place& at, unsigned rays) const {
+  OpenRays open(scene_, at);
+  draw_sky(at, rays,
+           [&](const glm::vec3& direction, const glm::vec3& light) { open.add(direction, light); });
   return open.sum();
+}
+
+std::optional<DirectLight::Shaded> DirectLight::shaded_by(
+    const RayScene& others, const glm::dvec3& position, const glm::dvec3& origin,
+    const glm::vec3& normal, const LightSampling& sampling, std::uint64_t seed) const {
+  const Place at{position, origin, glm::normalize(normal), seed};
+  // Draw all rays, those to the sky behind the others
+  thread_local std::vector<LightRay> rays;
+  rays_.draw(at.position, at.normal, sampling, at.seed, 0, rays);
+  const std::size_t lamps = rays.size();
+  draw_sky(at, sampling.sky_rays, [&](const glm::vec3& direction, const glm::vec3& light) {
+    rays.push_back({.direction = direction, .irradiance = light});
+  });
+  // Find those that meet the others
+  thread_local std::vector<bool> meets;
+  meets.assign(rays.size(), false);
+  bool any = false;
+  for (std::size_t i = 0; i < lamps; ++i) any |= meets[i] = is_hidden(others, at, rays[i]);
+  std::array<glm::vec3, RayScene::kRaysAtOnce> directions{};
+  const auto trace_sky = [&](const RayScene& scene, const auto& note) {
+    for (std::size_t from = lamps; from < rays.size(); from += directions.size()) {
+      const std::size_t count = std::min(directions.size(), rays.size() - from);
+      for (std::size_t i = 0; i < count; ++i) directions[i] = rays[from + i].direction;
+      const std::uint32_t hidden =
+          scene.occluded(at.origin, std::span(directions).first(count), 0, kFar);
+      for (std::size_t i = 0; i < count; ++i) note(from + i, (hidden >> i & 1U) != 0);
+    }
+  };
+  trace_sky(others, [&](std::size_t ray, bool hidden) { any |= meets[ray] = hidden; });
+  if (!any) return std::nullopt;
+  // Add up what the own surfaces let through
+  Shaded light;
+  const auto add = [&](std::size_t ray, bool hidden) {
+    if (hidden) return;
+    light.alone += rays[ray].irradiance;
+    if (!meets[ray]) light.beside += rays[ray].irradiance;
+  };
+  for (std::size_t i = 0; i < lamps; ++i) add(i, is_hidden(scene_, at, rays[i]));
+  trace_sky(scene_, add);
+  if (!is_finite(light.alone)) return std::nullopt;
+  return light;
 }
 
 DirectLight::Result DirectLight::irradiance(const glm::dvec3& position, const glm::vec3& normal,

@@ -42,6 +42,19 @@ class DirectLight {
   [[nodiscard]] Result irradiance(const glm::dvec3& position, const glm::dvec3& origin,
                                   const glm::vec3& normal, const LightSampling& sampling,
                                   std::uint64_t seed) const;
+  /// The irradiance at a point, W/m^2: of its own scene, and with other surfaces beside that.
+  struct Shaded {
+    glm::vec3 alone{0}, beside{0};
+  };
+  /// Estimates what other surfaces leave of the light at a point. Both results are by the same
+  /// rays, those of irradiance().
+  /// @param others    surfaces that are not in the scene of this
+  /// @param position, origin, normal, sampling, seed  as for irradiance()
+  /// @return          nothing when no ray that brings light meets the others
+  [[nodiscard]] std::optional<Shaded> shaded_by(const RayScene& others, const glm::dvec3& position,
+                                                const glm::dvec3& origin, const glm::vec3& normal,
+                                                const LightSampling& sampling,
+                                                std::uint64_t seed) const;
   /// Says whether no light and no emitter shines.
   [[nodiscard]] bool is_black() const noexcept { return sky_is_black_ && rays_.empty(); }
   /// Estimates the share of the light of suns, point and spot lights that the mesh hides, as
@@ -65,9 +78,12 @@ class DirectLight {
   [[nodiscard]] Sums from_lights(const Place& at, const LightSampling& sampling) const;
   [[nodiscard]] glm::vec3 from_sky(const Place& at, unsigned rays) const;
   class OpenRays;
+  template <class Take>
+  void draw_sky(const Place& at, unsigned rays, const Take& take) const;
+  template <class Take>
   void add_sky_ray(const Place& at, const glm::vec3& direction, float cosine_rays, float map_rays,
-                   float map_density, OpenRays& rays) const;
-  [[nodiscard]] bool is_hidden(const Place& at, const glm::dvec3& end) const;
+                   float map_density, const Take& take) const;
+  [[nodiscard]] bool is_hidden(const RayScene& by, const Place& at, const LightRay& ray) const;
 
   const RayScene& scene_;
   LightRays rays_;

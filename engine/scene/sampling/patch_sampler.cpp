@@ -89,10 +89,11 @@ double sides_of(const Mesh& mesh, std::uint32_t triangle) {
 }
 
 PatchSampler::PatchSampler(const RayScene& scene, const DirectLight* light,
-                           const LightSampling& rays)
+                           const LightSampling& rays, bool keeps_dark)
     : scene_(scene),
       light_(light),
-      lit_point_{share(rays.sun_rays), share(rays.area_rays), share(rays.sky_rays)} {}
+      lit_point_{share(rays.sun_rays), share(rays.area_rays), share(rays.sky_rays)},
+      keeps_dark_(keeps_dark) {}
 
 std::vector<PatchSampler::Group> PatchSampler::sum_up(const std::vector<SurfacePoint>& points,
                                                       const std::vector<std::uint32_t>& owners,
@@ -223,8 +224,8 @@ PatchSampler::Arriving PatchSampler::look_at(const SurfaceHit& at, bool front,
   }
   const glm::vec3 upwards = side * at.geometric_normal;
   if (is_buried(scene_, *origin, upwards, seed)) return {Place::buried};
-  const bool dark = sides_of(scene_.mesh(), at.triangle) == 2 && !light_->is_black() &&
-                    is_left_dark(*origin, upwards, seed);
+  const bool dark = !keeps_dark_ && sides_of(scene_.mesh(), at.triangle) == 2 &&
+                    !light_->is_black() && is_left_dark(*origin, upwards, seed);
   return {dark ? Place::dark : Place::seen};
 }
 

@@ -47,7 +47,9 @@ class PatchSampler {
   /// @param light  of that scene, must outlive this; null: surfels reflect nothing, and none counts
   ///               as buried, because `scene` is a part of what could bury it
   /// @param rays   shadow rays of each surfel
-  PatchSampler(const RayScene& scene, const DirectLight* light, const LightSampling& rays);
+  /// @param keeps_dark  as SamplingOptions::keeps_dark
+  PatchSampler(const RayScene& scene, const DirectLight* light, const LightSampling& rays,
+               bool keeps_dark);
 
   /// Returns the surfels of a patch. The sum of their 2 r^2 is the area of the patch less that of
   /// groups that are buried; surfels of what is not opaque are smaller, so that they cover as much.
@@ -86,6 +88,7 @@ class PatchSampler {
   const RayScene& scene_;
   const DirectLight* light_;
   LightSampling lit_point_;  // shadow rays for each lit point of a surfel
+  bool keeps_dark_;
 };
 
 }  // namespace ptc

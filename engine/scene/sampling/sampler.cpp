@@ -24,13 +24,13 @@ constexpr double kMaxAcross = 3e5;  // spacings along the side of a square as la
 class MeshSource final : public PatchStream {
  public:
   MeshSource(const DirectLight& light, const RayScene& scene, const SamplingOptions& options,
-             const Executor& executor, unsigned at_once)
+             const Executor& executor, unsigned at_once, std::uint32_t first)
       : PatchStream(executor, at_once),
-        sampler_(scene, &light, options.lights),
+        sampler_(scene, &light, options.lights, options.keeps_dark),
         field_(with_spacing(options, options.spacing > 0
                                          ? sampled_area(scene.mesh())
                                          : seen_area(light, scene, options.lights, executor))),
-        patches_(scene.mesh(), field_, kPatchSurfels) {}
+        patches_(scene.mesh(), field_, kPatchSurfels, first) {}
 
  private:
   [[nodiscard]] std::size_t patches() const override { return patches_.size(); }
@@ -77,9 +77,9 @@ void check_sampling(const SamplingOptions& options) {
   check_camera(*options.camera, "sampling.camera");
 }
 
-double sampled_area(const Mesh& mesh) {
+double sampled_area(const Mesh& mesh, std::uint32_t first) {
   double area = 0;
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+  for (std::uint32_t i = first; i < mesh.triangles.size(); ++i) {
     area += sides_of(mesh, i) * whole_triangle(mesh, i).area();
   }
   return area;
@@ -97,8 +97,8 @@ std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
 
 std::unique_ptr<PointSource> sample_mesh(const DirectLight& light, const RayScene& scene,
                                          const SamplingOptions& options, const Executor& executor,
-                                         unsigned at_once) {
-  return std::make_unique<MeshSource>(light, scene, options, executor, at_once);
+                                         unsigned at_once, std::uint32_t first) {
+  return std::make_unique<MeshSource>(light, scene, options, executor, at_once, first);
 }
 
 double seen_area(const DirectLight& light, const RayScene& scene, const LightSampling& rays,
@@ -116,7 +116,7 @@ double seen_area(const DirectLight& light, const RayScene& scene, const LightSam
   }
   const PlacesByArea places(scene, triangles, 0);
   if (!(places.area() > 0)) return area;
-  const PatchSampler sampler(scene, &light, rays);
+  const PatchSampler sampler(scene, &light, rays, false);
   std::vector<float> seen(kPlaces);  // sides, times the opacity
   executor.for_each(kPlaces, [&](std::size_t i, unsigned) {
     const SurfaceHit at = places.place(static_cast<std::uint32_t>(i), kPlaces);

@@ -25,6 +25,8 @@ struct SamplingOptions {
   float pixels_per_surfel = 1;  ///< maximum distance between neighbours in that view, pixels
   float finest = 0.125f;        ///< minimum spacing in that view, as a share of `spacing`
   LightSampling lights;         ///< shadow rays for each surfel
+  /// Keeps the sides of double-sided materials that no light reaches, because light comes later.
+  bool keeps_dark = false;
 };
 
 /// Checks everything about the options that does not depend on the mesh.
@@ -37,7 +39,8 @@ void check_sampling(const SamplingOptions& options);
 ///         surfels
 [[nodiscard]] SamplingOptions with_spacing(SamplingOptions options, double area);
 /// Returns the area of a mesh, where both sides of double-sided materials count.
-[[nodiscard]] double sampled_area(const Mesh& mesh);
+/// @param first  the first triangle that counts
+[[nodiscard]] double sampled_area(const Mesh& mesh, std::uint32_t first = 0);
 
 /// Returns the spacing that gives about `count` surfels on the mesh: sqrt(area / count), where both
 /// sides of double-sided materials count. It is 0 for a mesh without area.
@@ -70,13 +73,13 @@ inline constexpr double kLeastSeen = 0.05;
 /// Memory: sampling_bytes().
 /// @param light, scene, executor  must outlive the source
 /// @param at_once  patches that are made at the same time, at most; 0: one for each thread
+/// @param first    the first triangle of the mesh that gets surfels; those before it are only in
+///                 the way
 /// @throws RequestError when count, spacing or a camera's number makes no sense, or there
 ///         would be more than 9 * 10^10 surfels
-[[nodiscard]] std::unique_ptr<PointSource> sample_mesh(const DirectLight& light,
-                                                       const RayScene& scene,
-                                                       const SamplingOptions& options,
-                                                       const Executor& executor,
-                                                       unsigned at_once = 0);
+[[nodiscard]] std::unique_ptr<PointSource> sample_mesh(
+    const DirectLight& light, const RayScene& scene, const SamplingOptions& options,
+    const Executor& executor, unsigned at_once = 0, std::uint32_t first = 0);
 /// The bytes that a patch takes while its surfels are made.
 inline constexpr std::uint64_t kSampledPatchBytes = std::uint64_t{20} << 20;
 /// Returns the bytes that sampling takes in addition to the mesh: 24 for each triangle or for each

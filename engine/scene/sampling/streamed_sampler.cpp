@@ -39,7 +39,7 @@ class StreamedSource final : public PatchStream {
     const SurfacePatch points = patches.spread(0, PatchSampler::kPointsPerSurfel);
     if (points.surfels == 0) return {{}, points.area, points.area};
     const RayScene rays(patch.mesh);
-    return {PatchSampler(rays, nullptr, {}).sample(points), points.area};
+    return {PatchSampler(rays, nullptr, {}, false).sample(points), points.area};
   }
 
   SpacingField field_;

@@ -266,9 +266,10 @@ void keep_opaque(const Mesh& mesh, SurfacePatch& patch) {
 
 }  // namespace
 
-SurfacePatches::SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels)
+SurfacePatches::SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels,
+                               std::uint32_t first)
     : mesh_(mesh), field_(field) {
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+  for (std::uint32_t i = first; i < mesh.triangles.size(); ++i) {
     cut_into_pieces(whole_triangle(mesh, i), field, mesh.origin,
                     [&](const SubTriangle& /*shape*/, std::uint32_t path) {
                       pieces_.push_back({i, path});

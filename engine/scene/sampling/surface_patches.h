@@ -73,7 +73,9 @@ class SurfacePatches {
   /// Cuts and sorts the surface.
   /// @param mesh, field  must outlive this
   /// @param surfels      wanted in one patch, roughly
-  SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels);
+  /// @param first        the first triangle that counts
+  SurfacePatches(const Mesh& mesh, const SpacingField& field, double surfels,
+                 std::uint32_t first = 0);
 
   /// A part of a triangle. Below its leading 1, the path has a bit for each halving, the first one
   /// on top: 0b1 is the whole triangle, 0b110 the first half of the second half.
