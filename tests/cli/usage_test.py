@@ -110,7 +110,7 @@ class Usage(ProgramTest):
             "ptcbake": ["--margin=-1", "--margin=65", "--size=0", "--size=10x", "--size=x5", "--size=65537", "--samples=2",
                         "--layer=reflection=o.png", "--layer=irradiance=o.exr"],
             "ptcrender": ["--bounces=-1", "--size=10", "--size=0x10", "--size=10x", "--size=-1x5", "--size=10x70000",
-                          "--samples=0", "--samples=3", "--exposure=inf", "--layer=depth=a.png",
+                          "--samples=0", "--samples=3", "--exposure=inf", "--layer=haze=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
             "ptcconvert": ["--codec=", "--page-size=64"],
         }

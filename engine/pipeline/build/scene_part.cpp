@@ -117,7 +117,10 @@ BuildInputs read_part(const BuildRequest& request, ScenePart& part, const MeshLi
   MeshChoice choice{.one_sided = request.one_sided, .moment = request.moment};
   const auto load = [&](Motion motion, MeshLimits room, Progress& told) {
     choice.part = motion;
-    return load_meshes(request.inputs, request.mesh.get(), choice, room, told);
+    LoadedMeshes loaded = load_meshes(request.inputs, request.mesh.get(), choice, room, told);
+    loaded.mesh.objects.clear();  // surfels do not know them
+    loaded.mesh.object_runs.clear();
+    return loaded;
   };
   LoadedMeshes still = load(Motion::still, limits, silent);
   if (still.parts) throw IsOneWhole("the meshes do not fit in memory");

@@ -80,7 +80,7 @@ class StillLight {
 
 /// Cuts the triangles of a mesh from one on off, with their vertices. Both meshes keep all
 /// materials.
-/// @pre the vertices of those triangles follow all others
+/// @pre the vertices of those triangles follow all others, and the mesh knows no objects
 [[nodiscard]] Mesh cut_mesh(Mesh& mesh, std::uint32_t first);
 
 }  // namespace ptc

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/base/error.h"
 #include "engine/parallel/thread_pool.h"
 #include "tools/bench/chart/flip.h"
 #include "tools/bench/experiments/experiment.h"
@@ -86,16 +87,21 @@ Report report_of(const std::vector<Line>& lines, const std::vector<Image>& panel
 
 Experiment make_stability_experiment() {
   const auto numbers = std::make_shared<std::vector<std::string>>();
-  for (const Row& row : all_rows()) {
-    if (numbers->empty() || numbers->back() != row.number) numbers->emplace_back(row.number);
-  }
+  const auto check = [=] {
+    for (const std::string& number : *numbers) {
+      const std::vector<Row> rows = all_rows();
+      require_request(
+          std::ranges::any_of(rows, [&](const Row& row) { return number == row.number; }), "row",
+          "no row has this number");
+    }
+  };
   const auto run = [=](const Bench& b) {
     const ThreadPool executor(b.run.threads);
     const Lab lab{b.work, executor};
     std::vector<Line> lines;
     std::vector<Image> panels;
     for (const Row& row : all_rows()) {
-      if (std::ranges::find(*numbers, row.number) == numbers->end()) continue;
+      if (!numbers->empty() && std::ranges::find(*numbers, row.number) == numbers->end()) continue;
       const Outcome outcome = row.measure(lab);
       std::optional<double> flip;
       if (!outcome.field.ours.empty()) panels.push_back(panel_of(outcome.field, flip.emplace()));
@@ -114,9 +120,12 @@ Experiment make_stability_experiment() {
           .quick = "Nothing else: all rows take a minute or two",
           .declare =
               [=](Declaration& d) {
-                d.words("--row", *numbers, "Measure only the rows of this number; repeatable");
+                d.list(
+                    "--row", "N", *numbers, [](const std::string& text) { return text; },
+                    "Measure only the rows of this number, 1 to 33; repeatable");
               },
-          .run = run};
+          .run = run,
+          .check = check};
 }
 
 }  // namespace ptc::bench
