@@ -150,9 +150,9 @@ void check_mesh(const Mesh& mesh, const char* field) {
                   field, "mesh: its objects do not begin with its triangles");
   for (std::size_t i = 0; i < mesh.object_runs.size(); ++i) {
     const ObjectRun& run = mesh.object_runs[i];
-    require_request(
-        run.object < mesh.objects.size() && (i == 0 || run.first > mesh.object_runs[i - 1].first),
-        field, "mesh: a run of triangles has no object, or is out of order");
+    require_request(run.object < mesh.objects.size() && run.first < mesh.triangles.size() &&
+                        (i == 0 || run.first > mesh.object_runs[i - 1].first),
+                    field, "mesh: a run of triangles has no object, or is out of order");
   }
   require_request(std::ranges::all_of(mesh.normals, is_sane), field,
                   "mesh: a normal is not finite or beyond 1e18");

@@ -26,7 +26,7 @@ class Measure(ProgramTest):
 
     def test_results_that_are_there_are_in_the_list(self):
         names = {path.stem for path in (ROOT / "spec/results").glob("*.md")} - {"README"}
-        self.assertLessEqual(names, set(listed()))
+        self.assertLessEqual(names - {"scenes"}, set(listed()))  # which tools/scenes.py writes
 
     def test_every_experiment_writes_a_result(self):
         help_text = self.succeed("ptcbench", "--help").stdout

@@ -167,6 +167,8 @@ TEST_CASE("obj: objects are what follows an o, or a g without any o before it", 
   check("f 1 2 3\no a\nf 2 3 4\no b\nf 1 1 2\no a\nf 1 2 3\n", {"a", "", "b"},
         {{0, 1}, {1, 0}, {2, 0}});
   check("o a\no b\nf 1 2 3\n", {"a", "b"}, {{0, 1}});
+  // The last object has no triangle with an area
+  check("o a\nf 1 2 3\no b\nf 1 1 2\n", {"a", "b"}, {{0, 0}});
   check("o " + std::string(300, 'n') + "\nf 1 2 3\n", {std::string(255, 'n')}, {{0, 0}});
 }
 

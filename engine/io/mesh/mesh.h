@@ -193,8 +193,8 @@ struct MeshFile {
 /// is checked. If only some triangles have normals, the others get flat ones.
 ///
 /// Objects are the nodes of glTF that show a mesh, and what follows an `o` of OBJ, or a `g` in
-/// files without `o`. Other formats do not tell objects apart, nor is that known of more than
-/// 65,536 objects in a file, or of a mesh on the disk.
+/// files without `o`. Files of other formats, files with more than 65,536 objects, and meshes on
+/// the disk count as one object.
 ///
 /// Albedo is Kd of MTL and the base colour of glTF, emission Ke and emissiveFactor, all linear,
 /// with their textures. A map_Ke without Ke is the emission itself. Opacity is d, or 1 - Tr, and

@@ -94,7 +94,7 @@ class GltfMesh {
       node = use.node;
       add_mesh(use.mesh, glm::dmat4(use.place));
     }
-    if (soup_.has_too_many_objects()) warnings_.add(kObjectsLeftOut, "65,536 nodes or more");
+    if (soup_.has_too_many_objects()) warnings_.add(kObjectsLeftOut, "more than 65,536 nodes");
     for (std::size_t i = 0; i < document_.count("skins"); ++i) {
       warnings_.add(kSkinLeftOut, "skin " + std::to_string(i));
     }

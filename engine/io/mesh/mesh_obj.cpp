@@ -8,8 +8,8 @@
 //   o NAME             object of what follows  g NAME ...            group of what follows
 //
 // Groups count as objects in files that have no objects before them. Statements of other kinds
-// (curves, smoothing) are skipped. Positions, normals and texture
-// coordinates are counted separately; negative indices count backwards from the last one read.
+// (curves, smoothing) are skipped. Positions, normals and texture coordinates are counted
+// separately; negative indices count backwards from the last one read.
 #include <algorithm>
 #include <array>
 #include <exception>
@@ -186,7 +186,7 @@ class ObjMesh {
       objects_[name] = soup_.begin_object(name);
       if (!soup_.has_too_many_objects()) return;
       objects_.clear();
-      warnings_.add(kObjectsLeftOut, "65,536 objects or more");
+      warnings_.add(kObjectsLeftOut, "more than 65,536 objects");
     }
   }
 

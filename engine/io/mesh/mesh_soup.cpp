@@ -66,13 +66,15 @@ Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& position
   std::vector<std::array<std::uint32_t, 3>> cut;
   std::size_t first = 0, number = 0;
   auto run = soup.object_runs().begin();
+  const auto drop_empty_run = [&] {
+    if (!made.object_runs.empty() && made.object_runs.back().first == made.triangles.size())
+      made.object_runs.pop_back();
+  };
   for (const MeshSoup::Polygon& of : soup.polygons.items()) {
     if (run != soup.object_runs().end() && run->first == number) {
-      const auto triangle = static_cast<std::uint32_t>(made.triangles.size());
-      // Drop a run that has no triangle
-      if (!made.object_runs.empty() && made.object_runs.back().first == triangle)
-        made.object_runs.pop_back();
-      made.object_runs.push_back({triangle, run++->object});
+      drop_empty_run();
+      made.object_runs.push_back(
+          {static_cast<std::uint32_t>(made.triangles.size()), run++->object});
     }
     ++number;
     const auto corners = std::span(soup.corners.items()).subspan(first, of.corners);
@@ -89,6 +91,7 @@ Soup make_triangles(const MeshSoup& soup, const std::vector<glm::vec3>& position
       made.material_of.push_back(of.material);
     }
   }
+  drop_empty_run();
   return made;
 }
 

@@ -36,11 +36,13 @@ BuildReport MovingScene::build(const BuildRequest& request, const std::filesyste
     return build_container(request, target, progress);
   }
   try {
-    build_moving();
-  } catch (const BasisDiffers&) {
-    still_.reset();  // before the next one takes its space
-    build_still();
-    build_moving();
+    try {
+      build_moving();
+    } catch (const BasisDiffers&) {
+      still_.reset();  // before the next one takes its space
+      build_still();
+      build_moving();
+    }
   } catch (const IsOneWhole&) {
     return build_container(request, target, progress);
   }

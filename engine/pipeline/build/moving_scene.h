@@ -12,10 +12,10 @@
 namespace ptc {
 
 /// Builds containers of the moments of a scene, and keeps what stands still from one to the next.
-/// Each is the one that it would be alone.
+/// Each container equals the one that is built for its moment alone.
 class MovingScene {
  public:
-  /// @param directory  for the container of what stands still, which goes with this object
+  /// @param directory  for the container of what stands still, which is deleted with this object
   explicit MovingScene(std::filesystem::path directory) : directory_(std::move(directory)) {}
 
   /// Builds the container of the request's moment.

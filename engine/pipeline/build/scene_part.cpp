@@ -13,6 +13,7 @@
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/scene/sampling/sampler.h"
+#include "format/checksum.h"
 
 namespace ptc {
 namespace {
@@ -56,6 +57,12 @@ std::string sides_of_first(const Mesh& mesh, std::uint32_t count) {
     if (mesh.materials[mesh.material_of[i]].double_sided) sides[i] = '2';
   }
   return sides;
+}
+
+/// Returns a text that changes with the shape of a mesh, as when its file is written anew.
+std::string digest_of(const Mesh& mesh) {
+  return fmt::format("{:016x} {:016x}", xxh3_64(std::as_bytes(std::span(mesh.positions))),
+                     xxh3_64(std::as_bytes(std::span(mesh.triangles))));
 }
 
 /// The lights of a request, chosen as for a scene in one piece.
@@ -137,6 +144,7 @@ BuildInputs read_part(const BuildRequest& request, ScenePart& part, const MeshLi
   const PartLights lights(request, limits);
   const bool moving_emits = moving.mesh.emits();
   const bool emits = still.mesh.emits() || moving_emits;
+  const std::string still_digest = digest_of(still.mesh);
   JoinedParts parts(std::move(still.mesh));
   std::optional<Mesh> at_rest;
   if (request.sampling.spacing > 0) part.spacing = request.sampling.spacing;
@@ -159,8 +167,9 @@ BuildInputs read_part(const BuildRequest& request, ScenePart& part, const MeshLi
   const Solids solids = find_solids(mesh);
   auto lit = std::make_unique<LitMesh>(std::move(mesh), solids, inputs.lights, false);
   lit->first = parts.first();
-  const std::string follows = fmt::format("{}\n{}\n{}", lights_record(inputs.lights), moving_emits,
-                                          sides_of_first(lit->mesh, parts.first()));
+  const std::string follows =
+      fmt::format("{}\n{}\n{}\n{}", lights_record(inputs.lights), moving_emits,
+                  sides_of_first(lit->mesh, parts.first()), still_digest);
   const Uuid basis = uuid_of(std::as_bytes(std::span(follows)));
   if (is_still) {
     mesh = std::move(lit->mesh);

@@ -1,11 +1,9 @@
 // The two parts of a scene that moves, which are built apart: what stands still, once, and for each
 // moment what moves.
 //
-//   still parts  --- sample, light ---> container ----- light anew where it changes ---.
-//                                                                                      +-->
-//                                                                                      container
-//   moving parts ------------------------------------ sample, light, sort, merge ------'    of a
-//   moment
+//   still parts ---- sample, light ---> container ---- light anew ----.
+//                                                                     +---> container of
+//   moving parts -------------------- sample, light, sort, merge -----'     a moment
 //
 // The container of a moment follows from the request and the moment alone: what the container of
 // the still parts follows from besides is its basis, and one with another basis is built again.
@@ -21,7 +19,7 @@
 
 namespace ptc {
 
-/// What of a scene a build makes, and what both parts agree in.
+/// The part of a scene that a build makes, and the numbers that both parts have in common.
 struct ScenePart {
   Motion motion = Motion::still;
   /// Distance between neighbouring surfels of both parts, as the scene at rest has it, scene units.

@@ -233,7 +233,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
   }
 
   // Divide the memory among as many threads as it allows, and collect what emits
-  const auto sky = sky_function(smooth_sky(rig.sky, 4 * request.gather.resolution));
+  const auto sky = sky_function(smooth_sky(rig.sky));
   const bool by_rays = emitting > 0 || has_lamps(rig);
   const auto lights_with = [&](unsigned threads) {
     return threads * ((by_rays ? 1U : 0U) + (sky ? 1U : 0U));
@@ -245,6 +245,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
     MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
     budget.charge("emitters", 160 * report.emitters);
     charge_sky(budget, rig.sky);
+    if (rig.sky.map) budget.charge("the sky as it is gathered", smooth_sky_bytes());
     budget.charge(
         "the output's directory",
         ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads) +

@@ -146,6 +146,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
                        const glm::dvec3& eye, const std::filesystem::path& target) {
   charge_bounces(budget, scene_, request_.bounces, executor_.threads());
   charge_sky(budget, sky);
+  if (sky.map) budget.charge("the sky as it is gathered", smooth_sky_bytes());
   if (request_.glossy.roughness) {
     mirrors_ = {.eye = eye,
                 .roughness = *request_.glossy.roughness,
@@ -157,7 +158,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
   }
   options_ = {.back_end = request_.back_end,
               .gather = request_.gather,
-              .sky = sky_function(smooth_sky(sky, 4 * request_.gather.resolution)),
+              .sky = sky_function(smooth_sky(sky)),
               .visibility = disc_visibility(request_.gather.sides),
               .lost = lost_.get(),
               .variants = variants};

@@ -94,8 +94,8 @@ class Film {
   /// @pre same width, and the same extras: surfaces and ids at most
   void add_group(const std::string& layer, const Film& group, unsigned first);
 
-  /// Completes the layers of estimates: mean squares become root mean squares, and depth where
-  /// there is no surface. Nothing can be added afterwards.
+  /// Completes the layers of estimates: mean squares become root mean squares. Pixels without a
+  /// surface get their depth. Nothing can be added afterwards.
   void finish();
 
   /// A layer of an .exr and its values.

@@ -49,8 +49,8 @@ class PictureFiles {
   /// @param window    that the files hold; a .png is that large
   /// @param layers    of each .exr
   /// @param text      in the header of each .exr
-  /// @param display    how a .png of light is shown; occlusion and albedo stay. Empty: chosen by
-  ///                   the beauty of the whole picture, for all layers alike
+  /// @param display    how a .png of light is shown; other layers stay as they are. Empty: it is
+  ///                   chosen by the beauty of the whole picture, for all layers alike
   /// @param directory  of the temporary files of pictures whose display is chosen
   /// @throws std::system_error
   PictureFiles(std::span<const PictureTarget> targets, const ImageWindow& window,

@@ -199,8 +199,9 @@ std::function<glm::vec3(const glm::vec3&)> sky_function(const Sky& sky) {
 }
 
 Sky smooth_sky(const Sky& sky, unsigned width) {
-  if (!has_map(sky) || sky.map->width() <= width) return sky;
+  if (!has_map(sky) || (sky.map->width() <= width && sky.map->height() <= width / 2)) return sky;
   const unsigned height = std::min(width / 2, sky.map->height());
+  width = std::min(width, sky.map->width());
   const double columns = static_cast<double>(width) / sky.map->width();
   const double rows = static_cast<double>(height) / sky.map->height();
   std::vector<glm::dvec3> sums(std::size_t{width} * height), line(width);
@@ -224,6 +225,7 @@ Sky smooth_sky(const Sky& sky, unsigned width) {
     }
   });
   Image image{.width = width, .height = height};
+  image.pixels.reserve(sums.size());
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const double y = static_cast<double>(i / width);
     const double whole = std::cos(y * kPiDouble / height) - std::cos((y + 1) * kPiDouble / height);

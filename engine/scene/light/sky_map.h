@@ -86,12 +86,21 @@ class SkyDensity {
   std::vector<float> blocks_;  ///< within each row, the share up to and including each block
 };
 
+/// Columns of the map that a gather takes: its direction pixels are at least half as wide.
+inline constexpr unsigned kGatheredColumns = 128;
+
 /// Returns a sky whose map has no more columns than a gather can tell apart: each pixel is the mean
 /// of the map over its solid angle, so that small bright spots such as the sun keep their light
 /// where a direction pixel is larger than they are.
-/// @param width  greatest number of columns, even
-/// @return  the sky itself where its map is no wider, or where it has none
-/// Time: that of reading the map once.   Memory: 32 bytes for each pixel of the new map.
-[[nodiscard]] Sky smooth_sky(const Sky& sky, unsigned width);
+/// @param width  greatest number of columns, even; half as many rows
+/// @return  the sky itself where its map has no more of both, or where it has none
+/// Time: that of reading the map once.   Memory: smooth_sky_bytes().
+[[nodiscard]] Sky smooth_sky(const Sky& sky, unsigned width = kGatheredColumns);
+
+/// Returns the most memory that smooth_sky() takes while it makes a map, bytes: sums, pixels and
+/// the texture of them.
+[[nodiscard]] constexpr std::uint64_t smooth_sky_bytes(unsigned width = kGatheredColumns) noexcept {
+  return std::uint64_t{width} * (width / 2) * 48;
+}
 
 }  // namespace ptc

@@ -54,7 +54,6 @@ Outcome wedges(const Lab& lab) {
   constexpr double kSpacing = 0.02;
   constexpr unsigned kRows = 8;
   Outcome outcome{.field = {.width = kWidth}};
-  std::vector<glm::vec3> covered, truly_covered;
   for (const double degrees : {20.0, 45.0, 90.0, 150.0}) {
     const double angle = degrees * kPiDouble / 180;
     const glm::dvec3 along(0, 6, 0), up(2 * std::cos(angle), 0, 2 * std::sin(angle));
@@ -227,7 +226,7 @@ Outcome sunk_ball(const Lab& lab) {
     const double ring = std::sqrt(0.75) + 0.01 + 1.5 * u * u, turn = 2 * kPiDouble * v;
     return Receiver{{ring * std::cos(turn), ring * std::sin(turn), lift}, {0, 0, 1}};
   });
-  const auto shaded = scene.shade(receivers, [](const glm::vec3&) { return glm::vec3(1); });
+  const auto shaded = scene.shade(receivers, white_sky);
   const auto traced = trace_at_mesh(lab, mesh, lights, receivers, 1024);
   const auto ours = values(shaded, brightness), truth = values(traced, brightness);
   return {.figures = {{"occlusion, RMS error",

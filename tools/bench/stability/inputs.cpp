@@ -256,8 +256,7 @@ Outcome one_pixel_sun(const Lab& lab) {
   const auto receivers = receivers_on_grid(kSide, kSide, [&](double u, double v) {
     return Receiver{{4 * u - 2, lift, 4 * v - 2}, {0, 1, 0}};
   });
-  const auto shaded =
-      scene.shade(receivers, sky_function(smooth_sky(lights.sky, 4 * GatherOptions().resolution)));
+  const auto shaded = scene.shade(receivers, sky_function(smooth_sky(lights.sky)));
   const RayScene rays(mesh);
   const DirectLight light(rays, lights);
   std::vector<glm::vec3> ours, truth(receivers.size());

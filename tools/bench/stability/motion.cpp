@@ -18,7 +18,7 @@ constexpr unsigned kFrames = 100, kReceivers = 32, kRays = 1024;
 constexpr double kSpacing = 0.05;
 constexpr double kAllowed = 0.005;  // of white, beyond one and a half of the true step
 
-/// Receivers along a line on the floor. @param time  from 0 to 1
+/// Receivers along a line on the floor. @param shift  by which the line has moved, scene units
 std::vector<Receiver> on_floor(double shift) {
   return receivers_on_grid(kReceivers, 1, [&](double u, double) {
     return Receiver{{2.4 * u - 1.2 + shift, -0.2 + 0.5 * shift, 0.1 * kSpacing}, {0, 0, 1}};
@@ -91,8 +91,9 @@ Outcome moving_lamp(const Lab& lab) {
 
 constexpr std::array kRows = std::to_array<Row>({
     {"15", "receivers that move", "light that jumps", moving_receivers},
-    {"24", "object that moves", "shadows that stay or jump", moving_object},
-    {"24", "lamp that moves", "light that stays or jumps", moving_lamp},
+    {"24", "object that moves, in a scene built for each frame", "shadows that jump",
+     moving_object},
+    {"24", "lamp that moves, in a scene built for each frame", "light that jumps", moving_lamp},
 });
 
 }  // namespace

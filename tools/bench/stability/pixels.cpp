@@ -86,7 +86,6 @@ Outcome random_discs(const Lab& lab) {
     if (glm::dot(to, glm::dvec3(normal)) > 0) to = -to;  // its front
     const std::array disc{disc_at(to, normal, 1)};
     const std::array receiver{Receiver{{0, 0, 0}, random.direction()}};
-    DirectionBuffer buffer(GatherOptions().resolution);
     static const DirectionGrid grid(GatherOptions().resolution, {});
     std::array<Shading, 1> drawn;
     shade_brute_force(disc, receiver, drawn, grid, Sides::both, lab.executor);
@@ -246,7 +245,6 @@ Outcome thousand_directions(const Lab& lab) {
 }
 
 /// An emitter that moves by small steps from `first` to `last`, radians from the normal.
-/// @param height  rows of the field
 Outcome moving_emitter(const Lab& lab, double first, double last, double radius) {
   constexpr unsigned kSteps = 256, kRays = 1 << 14, kRows = 24;
   const DirectionGrid grid(GatherOptions().resolution, {});
