@@ -11,9 +11,9 @@ namespace {
 constexpr unsigned kGap = 4;    // pixels between pictures that belong together
 constexpr unsigned kSpace = 6;  // pixels between others, before they are zoomed
 
-Image white_sheet(unsigned width, unsigned height) {
+Image blank_sheet(unsigned width, unsigned height, float grey) {
   Image sheet{width, height, {}};
-  sheet.pixels.assign(std::size_t{width} * height, glm::vec3(1));
+  sheet.pixels.assign(std::size_t{width} * height, glm::vec3(grey));
   return sheet;
 }
 
@@ -34,7 +34,7 @@ Image flip_map(const std::vector<float>& errors, unsigned width, unsigned height
 Image side_by_side(const std::vector<Image>& images) {
   const unsigned width = images.front().width, height = images.front().height;
   const auto count = static_cast<unsigned>(images.size());
-  Image sheet = white_sheet(count * width + (count - 1) * kGap, height);
+  Image sheet = blank_sheet(count * width + (count - 1) * kGap, height, 1);
   for (unsigned i = 0; i < count; ++i) {
     for (unsigned y = 0; y < height; ++y) {
       const auto row = images[i].pixels.begin() + std::ptrdiff_t{y} * width;
@@ -63,7 +63,7 @@ Image in_columns(const std::vector<Image>& images, unsigned columns, unsigned zo
     height = std::max(height, y - kSpace);
   }
   // Copy the pictures
-  Image sheet = white_sheet(width * zoom, height * zoom);
+  Image sheet = blank_sheet(width * zoom, height * zoom, 0.2F);
   for (std::size_t k = 0; k < images.size(); ++k) {
     const Image& image = images[k];
     for (unsigned v = 0; v < image.height * zoom; ++v) {

@@ -18,7 +18,7 @@ inline constexpr float kFlipWhite = 0.25F;
 /// @param images  one or more
 [[nodiscard]] Image side_by_side(const std::vector<Image>& images);
 
-/// Returns pictures of any size below and beside one another on white, in columns of about equal
+/// Returns pictures of any size below and beside one another on grey, in columns of about equal
 /// height.
 /// @param zoom  pixels along the side of each pixel of the pictures, 1 or more
 [[nodiscard]] Image in_columns(const std::vector<Image>& images, unsigned columns, unsigned zoom);
