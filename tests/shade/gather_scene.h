@@ -35,18 +35,6 @@ struct Scene {
   }
 };
 
-/// A floor, a red wall and some balls: contacts, occlusion, colour.
-inline std::vector<Surfel> small_scene(double spacing) {
-  std::vector<Surfel> surfels;
-  add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, spacing, glm::vec3(0.5F));
-  add_rectangle(surfels, {-2, 1.5, 0}, {4, 0, 0}, {0, 0, 2}, spacing, {0.8F, 0.1F, 0.1F});
-  for (int i = 0; i < 8; ++i) {
-    add_sphere(surfels, {-1.5 + 0.4 * i, -1 + 0.3 * (i * 5 % 8), 0.3 + 0.1 * (i % 3)},
-               0.2 + 0.03 * (i % 4), spacing, {0.2F + 0.08F * static_cast<float>(i), 0.6F, 0.3F});
-  }
-  return surfels;
-}
-
 inline void add_floor_receivers(std::vector<Receiver>& receivers, double spacing) {
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 48; ++i) {

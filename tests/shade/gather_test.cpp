@@ -4,7 +4,6 @@
 
 #include <catch2/catch.hpp>
 #include <glm/common.hpp>
-#include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <hwy/targets.h>
@@ -140,64 +139,6 @@ TEST_CASE("gather: nothing shines through a wall, from either side", "[shade][ga
       }
     }
   }
-}
-
-TEST_CASE("gather: walls of two sides show each side its own light, at any tilt",
-          "[shade][gather]") {
-  // The walls of a closed room shine inwards and are black outside.
-  const double degrees = GENERATE(0, 15, 30, 45);
-  CAPTURE(degrees);
-  constexpr double kSpacing = 0.02;
-  std::vector<Surfel> inside;
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::dvec3 u(0), v(0), n(0);
-    u[(axis + 1) % 3] = v[(axis + 2) % 3] = 2;
-    n[axis] = 2;
-    add_rectangle(inside, {-1, -1, -1}, u, v, kSpacing, glm::vec3(1));
-    add_rectangle(inside, glm::dvec3(-1) + n, v, u, kSpacing, glm::vec3(1));
-  }
-  const glm::dmat3 turn(glm::rotate(glm::rotate(glm::dmat4(1), glm::radians(degrees), {0, 1, 0}),
-                                    glm::radians(degrees), {1, 0, 0}));
-  std::vector<Surfel> surfels;
-  for (Surfel s : inside) {
-    s.position = turn * s.position;
-    s.normal = glm::vec3(turn * glm::dvec3(s.normal));
-    Surfel back = s;
-    back.normal = -s.normal;
-    back.radiance = glm::vec3(0);
-    s.position += 0.02 * static_cast<double>(s.radius) * glm::dvec3(s.normal);
-    back.position += 0.02 * static_cast<double>(s.radius) * glm::dvec3(back.normal);
-    back.radius *= 0.98F;
-    surfels.push_back(s);
-    surfels.push_back(back);
-  }
-  Scene scene(surfels);
-  constexpr int kSide = 12;
-  for (const double height : {-0.99, 0.5, -1.01}) {  // the last are below the floor and look up
-    for (int i = 0; i < kSide * kSide; ++i) {
-      const glm::dvec3 at(-0.88 + 0.16 * (i % kSide), height, -0.88 + 0.16 * (i / kSide));
-      scene.receivers.push_back({turn * at, glm::vec3(turn * glm::dvec3(0, 1, 0))});
-    }
-  }
-  const auto results = scene.shade();
-  constexpr std::size_t kInside = 2 * kSide * kSide;
-  double sum = 0, squares = 0, covered = 0, leak = 0;
-  for (std::size_t i = 0; i < results.size(); ++i) {
-    const double share = static_cast<double>(results[i].irradiance.g) / std::numbers::pi;
-    if (i < kInside) {
-      sum += share;
-      squares += (share - 1) * (share - 1);
-      covered += static_cast<double>(results[i].occlusion);
-    } else {
-      leak = std::max(leak, share);
-    }
-  }
-  const double mean = sum / kInside, rms = std::sqrt(squares / kInside);
-  CAPTURE(mean, rms, covered / kInside, leak);
-  CHECK(mean == Approx(1).margin(0.015));
-  CHECK(rms < 0.02);
-  CHECK(covered / kInside > 0.985);
-  CHECK(leak < 0.01);
 }
 
 TEST_CASE("gather: without clusters it equals drawing every surfel", "[shade][gather]") {

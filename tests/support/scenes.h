@@ -20,6 +20,7 @@ namespace ptc::test {
 using bench::add_rectangle;
 using bench::add_sphere;
 using bench::random_surfels;
+using bench::small_scene;
 using bench::sort_scene;
 using bench::SortedScene;
 using bench::VectorStream;

@@ -85,6 +85,17 @@ void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double r
   }
 }
 
+std::vector<Surfel> small_scene(double spacing) {
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, spacing, glm::vec3(0.5F));
+  add_rectangle(surfels, {-2, 1.5, 0}, {4, 0, 0}, {0, 0, 2}, spacing, {0.8F, 0.1F, 0.1F});
+  for (int i = 0; i < 8; ++i) {
+    add_sphere(surfels, {-1.5 + 0.4 * i, -1 + 0.3 * (i * 5 % 8), 0.3 + 0.1 * (i % 3)},
+               0.2 + 0.03 * (i % 4), spacing, {0.2F + 0.08F * static_cast<float>(i), 0.6F, 0.3F});
+  }
+  return surfels;
+}
+
 std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed) {
   std::mt19937_64 bits(seed);
   const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };

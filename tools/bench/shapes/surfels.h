@@ -48,6 +48,9 @@ void add_rectangle(std::vector<Surfel>& surfels, const glm::dvec3& corner, const
 void add_sphere(std::vector<Surfel>& surfels, const glm::dvec3& centre, double radius,
                 double spacing, const glm::vec3& radiance);
 
+/// Returns a floor of z = 0 with a red wall and some balls: contacts, occlusion, colour.
+[[nodiscard]] std::vector<Surfel> small_scene(double spacing);
+
 /// Returns `count` random surfels in the unit cube with random normals and radii, the same ones for
 /// the same seed.
 [[nodiscard]] std::vector<Surfel> random_surfels(std::size_t count, std::uint64_t seed);

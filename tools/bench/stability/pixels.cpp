@@ -21,19 +21,7 @@ namespace {
 
 constexpr unsigned kSide = 32;
 
-/// A floor, a red wall and some balls: contacts, occlusion, colour.
-std::vector<Surfel> still_life(double spacing) {
-  std::vector<Surfel> surfels;
-  add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, spacing, glm::vec3(0.5F));
-  add_rectangle(surfels, {-2, 1.5, 0}, {4, 0, 0}, {0, 0, 2}, spacing, {0.8F, 0.1F, 0.1F});
-  for (int i = 0; i < 8; ++i) {
-    add_sphere(surfels, {-1.5 + 0.4 * i, -1 + 0.3 * (i * 5 % 8), 0.3 + 0.1 * (i % 3)},
-               0.2 + 0.03 * (i % 4), spacing, {0.2F + 0.08F * static_cast<float>(i), 0.6F, 0.3F});
-  }
-  return surfels;
-}
-
-/// Receivers on the floor of still_life(). @param lift  above it
+/// Receivers on the floor of small_scene(). @param lift  above it
 std::vector<Receiver> floor_receivers(unsigned side, double lift) {
   return receivers_on_grid(side, side, [&](double u, double v) {
     return Receiver{{3 * u - 1.5, 1.4 - 2.9 * v, lift}, {0, 0, 1}};
@@ -113,7 +101,7 @@ Outcome random_discs(const Lab& lab) {
 /// A scene turned in eight ways, seen by receivers that turn with it.
 Outcome turned(const Lab& lab) {
   constexpr double kSpacing = 0.04;
-  const std::vector<Surfel> upright = still_life(kSpacing);
+  const std::vector<Surfel> upright = small_scene(kSpacing);
   const auto receivers = floor_receivers(kSide, 0.1 * kSpacing);
   const SmallScene first(lab, upright);
   const auto traced = first.trace(receivers, 4096);
@@ -185,7 +173,7 @@ Outcome edge_on(const Lab& lab) {
 
 /// The gather without clusters, beside all surfels drawn one by one.
 Outcome nothing_culled(const Lab& lab) {
-  const SmallScene scene(lab, still_life(0.1));
+  const SmallScene scene(lab, small_scene(0.1));
   const auto receivers = floor_receivers(kSide, 0.01);
   GatherOptions exact{.solid_angle = 1e-12F, .parallax = 1e-6F};
   const auto shaded = scene.shade(receivers, {}, exact);
@@ -303,7 +291,7 @@ Outcome across_horizon(const Lab& lab) {
 Outcome cell_seams(const Lab& lab) {
   constexpr double kSpacing = 0.05;
   constexpr unsigned kFine = 64;
-  const SmallScene scene(lab, still_life(kSpacing));
+  const SmallScene scene(lab, small_scene(kSpacing));
   // Close together, so that the truth hardly changes from one to the next
   const auto receivers = receivers_on_grid(kFine, kFine, [&](double u, double v) {
     return Receiver{{0.3 * u - 1.3, 0.3 * v - 0.4, 0.1 * kSpacing}, {0, 0, 1}};
