@@ -25,32 +25,32 @@ constexpr char kReading[] =
 
 /// A line of the table: a figure of a row.
 struct Line {
-  std::string number, scene, failure, figure;
-  double value = 0, bound = 0;
-  bool share = true;
+  std::string number, scene, failure;
+  Bounded figure;
   std::optional<double> flip;
 };
 
 const Columns<Line>& columns() {
   using L = Line;
-  const auto shown = [](double L::*member) {
+  const auto shown = [](double Bounded::*member) {
     return [member](const L& line) {
-      const double value = line.*member;
-      return line.share ? fmt::format("{:.3g} %", 100 * value) : fmt::format("{:.3g}", value);
+      const double value = line.figure.*member;
+      return line.figure.share ? fmt::format("{:.3g} %", 100 * value)
+                               : fmt::format("{:.3g}", value);
     };
   };
   static const Columns<L> columns{
       {"number", {"row"}, &L::number},
       {"scene", {"scene"}, &L::scene},
       {"failure", {"seen where a method fails"}, &L::failure},
-      {"figure", {"figure"}, &L::figure},
-      {"value", {""}, &L::value},
-      {"bound", {""}, &L::bound},
-      {"shown_value", {"measured"}, shown(&L::value)},
-      {"shown_bound", {"bound"}, shown(&L::bound)},
+      {"figure", {"figure"}, path(&L::figure, &Bounded::what)},
+      {"value", {""}, path(&L::figure, &Bounded::value)},
+      {"bound", {""}, path(&L::figure, &Bounded::bound)},
+      {"shown_value", {"measured"}, shown(&Bounded::value)},
+      {"shown_bound", {"bound"}, shown(&Bounded::bound)},
       {"holds",
        {"holds"},
-       [](const L& line) { return std::string(line.value <= line.bound ? "yes" : "NO"); }},
+       [](const L& line) { return std::string(line.figure.holds() ? "yes" : "NO"); }},
       {"flip", {"FLIP", "{:.4f}"}, [](const L& line) {
          return line.flip ? Value(*line.flip) : Value();
        }}};
@@ -106,8 +106,7 @@ Experiment make_stability_experiment() {
       std::optional<double> flip;
       if (!outcome.field.ours.empty()) panels.push_back(panel_of(outcome.field, flip.emplace()));
       for (const Bounded& figure : outcome.figures) {
-        lines.push_back({row.number, row.scene, row.failure, figure.what, figure.value,
-                         figure.bound, figure.share, flip});
+        lines.push_back({row.number, row.scene, row.failure, figure, flip});
       }
       b.publish(report_of(lines, panels));
     }

@@ -66,16 +66,12 @@ Outcome wedges(const Lab& lab) {
     });
     const std::array<glm::dvec3, 4> sheet{
         {{0, -3, 0}, {0, 3, 0}, glm::dvec3(0, 3, 0) + up, glm::dvec3(0, -3, 0) + up}};
-    for (const Shading& shading : scene.shade(receivers))
-      outcome.field.ours.push_back(brightness(shading));
+    outcome.field.add(scene.shade(receivers), brightness);
     for (const Receiver& receiver : receivers)
       outcome.field.truth.emplace_back(form_factor(receiver, sheet));
-    outcome.field.height += kRows;
   }
-  outcome.figures = {{"light of the slope, largest error",
-                      largest_difference(outcome.field.ours, outcome.field.truth), 0.04},
-                     {"light of the slope, RMS error",
-                      rms_difference(outcome.field.ours, outcome.field.truth), 0.01}};
+  outcome.figures = {{"light of the slope, largest error", outcome.field.largest_error(), 0.04},
+                     {"light of the slope, RMS error", outcome.field.rms_error(), 0.01}};
   return outcome;
 }
 
@@ -101,15 +97,14 @@ Outcome closed_wedges(const Lab& lab) {
     });
     const double clear = 2 * scene.radius() / static_cast<double>(std::tan(angle));
     const auto shaded = scene.shade(receivers, white_sky);
+    outcome.field.add(shaded, brightness);
     for (std::size_t i = 0; i < receivers.size(); ++i) {
-      outcome.field.ours.push_back(brightness(shaded[i]));
-      const double leak = static_cast<double>(outcome.field.ours.back().g);
+      const double leak = static_cast<double>(brightness(shaded[i]).g);
       double& largest = receivers[i].position.x < clear ? narrow : wide;
       largest = std::max(largest, leak);
     }
     for (const Shading& shading : scene.trace(receivers, 256, white_sky))
       discs.push_back(brightness(shading));
-    outcome.field.height += kRows;
   }
   outcome.field.truth = grey(outcome.field.ours.size(), 0);
   outcome.figures = {
@@ -134,13 +129,10 @@ Outcome near_walls(const Lab& lab) {
     const auto receivers = receivers_on_grid(kWidth, kRows, [&](double u, double v) {
       return Receiver{{2 * u - 1, v - 0.5, 0.9 * u}, {0, 0, 1}};
     });
-    for (const Shading& shading : scene.shade(receivers))
-      outcome.field.ours.push_back(brightness(shading));
-    outcome.field.height += kRows;
+    outcome.field.add(scene.shade(receivers), brightness);
   }
   outcome.field.truth = grey(outcome.field.ours.size(), 0);
-  outcome.figures = {{"light of the hidden wall, largest",
-                      largest_difference(outcome.field.ours, outcome.field.truth), 0.5},
+  outcome.figures = {{"light of the hidden wall, largest", outcome.field.largest_error(), 0.5},
                      {"light of the hidden wall, mean", mean_value(outcome.field.ours), 0.25}};
   return outcome;
 }
@@ -231,8 +223,7 @@ Outcome sunk_ball(const Lab& lab) {
   const auto ours = values(shaded, brightness), truth = values(traced, brightness);
   return {.figures = {{"occlusion, RMS error",
                        rms_difference(values(shaded, openness), values(traced, openness)), 0.02},
-                      {"light, RMS error over its mean",
-                       rms_difference(ours, truth) / mean_value(truth), 0.03}},
+                      {"light, RMS error over its mean", relative_rms(ours, truth), 0.03}},
           .field = {kWidth, kTurns, ours, truth}};
 }
 

@@ -150,6 +150,10 @@ double rms_difference(std::span<const glm::vec3> a, std::span<const glm::vec3> b
   return std::sqrt(sum / (3 * static_cast<double>(a.size())));
 }
 
+double relative_rms(std::span<const glm::vec3> ours, std::span<const glm::vec3> truth) {
+  return rms_difference(ours, truth) / mean_value(truth);
+}
+
 double mean_value(std::span<const glm::vec3> all) {
   double sum = 0;
   for (const glm::vec3& value : all) {

@@ -92,6 +92,9 @@ class SmallScene {
 [[nodiscard]] double largest_difference(std::span<const glm::vec3> a, std::span<const glm::vec3> b);
 /// Returns the root mean square of the differences in all channels.
 [[nodiscard]] double rms_difference(std::span<const glm::vec3> a, std::span<const glm::vec3> b);
+/// Returns rms_difference() over the mean of the true values.
+[[nodiscard]] double relative_rms(std::span<const glm::vec3> ours,
+                                  std::span<const glm::vec3> truth);
 /// Returns the mean of all channels.
 [[nodiscard]] double mean_value(std::span<const glm::vec3> values);
 

@@ -52,14 +52,11 @@ Outcome lone_plane(const Lab& lab) {
         const Surfel& s = surfels[i % surfels.size()];
         receivers.push_back({s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
       }
-      for (const Shading& shading : SmallScene(lab, surfels).shade(receivers))
-        outcome.field.ours.push_back(openness(shading));
-      outcome.field.height += 4;
+      outcome.field.add(SmallScene(lab, surfels).shade(receivers), openness);
     }
   }
   outcome.field.truth = grey(outcome.field.ours.size(), 1);
-  outcome.figures = {
-      {"occlusion, largest", largest_difference(outcome.field.ours, outcome.field.truth), 0.002}};
+  outcome.figures = {{"occlusion, largest", outcome.field.largest_error(), 0.002}};
   return outcome;
 }
 
@@ -91,10 +88,8 @@ Outcome random_discs(const Lab& lab) {
     }
     outcome.field.truth.emplace_back(1 - static_cast<double>(hits) / kRays);
   }
-  outcome.figures = {
-      {"occlusion, largest error", largest_difference(outcome.field.ours, outcome.field.truth),
-       0.01},
-      {"occlusion, RMS error", rms_difference(outcome.field.ours, outcome.field.truth), 0.002}};
+  outcome.figures = {{"occlusion, largest error", outcome.field.largest_error(), 0.01},
+                     {"occlusion, RMS error", outcome.field.rms_error(), 0.002}};
   return outcome;
 }
 
@@ -124,7 +119,7 @@ Outcome turned(const Lab& lab) {
     }
     const auto shaded = SmallScene(lab, surfels).shade(places);
     outcome.field.ours = values(shaded, brightness);
-    const double rms = rms_difference(outcome.field.ours, truth) / mean_value(truth);
+    const double rms = relative_rms(outcome.field.ours, truth);
     worst = std::max(worst, rms);
     square += std::pow(rms_difference(values(shaded, openness), values(traced, openness)), 2);
   }
@@ -227,8 +222,7 @@ Outcome thousand_directions(const Lab& lab) {
   }
   outcome.field.truth = grey(outcome.field.ours.size(), 0.5);
   outcome.figures = {{"solid angle, mean error", std::abs(sum / (kSide * kSide) - 1), 0.02},
-                     {"solid angle, RMS error",
-                      2 * rms_difference(outcome.field.ours, outcome.field.truth), 0.15}};
+                     {"solid angle, RMS error", 2 * outcome.field.rms_error(), 0.15}};
   return outcome;
 }
 

@@ -5,6 +5,11 @@
 
 namespace ptc::bench {
 
+void Field::add(std::span<const Shading> shadings, glm::vec3 (*value)(const Shading&)) {
+  for (const Shading& shading : shadings) ours.push_back(value(shading));
+  height += static_cast<unsigned>(shadings.size()) / width;
+}
+
 std::vector<Row> all_rows() {
   std::vector<Row> rows;
   for (const auto& some :

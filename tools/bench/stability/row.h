@@ -29,6 +29,13 @@ struct Bounded {
 struct Field {
   unsigned width = 0, height = 0;
   std::vector<glm::vec3> ours, truth;  ///< 0 is shown black, and 1 white
+
+  /// Adds rows of values of shadings to `ours`. @pre `width` divides their number
+  void add(std::span<const Shading> shadings, glm::vec3 (*value)(const Shading&));
+  /// Returns the greatest difference of both in any channel.
+  [[nodiscard]] double largest_error() const { return largest_difference(ours, truth); }
+  /// Returns the root mean square of their differences in all channels.
+  [[nodiscard]] double rms_error() const { return rms_difference(ours, truth); }
 };
 
 /// What a row found.

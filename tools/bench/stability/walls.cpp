@@ -20,6 +20,14 @@ namespace {
 
 constexpr unsigned kSide = 32;
 
+/// Adds true values: half of the rows white, the other half black.
+void add_white_and_black(unsigned rows, Field& field) {
+  for (const double light : {1.0, 0.0}) {
+    const auto half = grey(std::size_t{rows} / 2 * field.width, light);
+    field.truth.insert(field.truth.end(), half.begin(), half.end());
+  }
+}
+
 /// A closed ball from within: no gap between discs may show the sky.
 Outcome closed_ball(const Lab& lab) {
   Mesh mesh = sphere(1, 32);
@@ -90,15 +98,11 @@ Outcome two_sides(const Lab& lab) {
       const glm::dvec3 at(1.8 * u - 0.9, height, 3.2 * (v < 0.5 ? v : v - 0.5) - 0.8);
       return Receiver{turn * at, glm::vec3(turn * glm::dvec3(0, 1, 0))};
     });
-    for (const Shading& shading : scene.shade(receivers))
-      outcome.field.ours.push_back(brightness(shading));
-    for (unsigned i = 0; i < kRows * kSide; ++i)
-      outcome.field.truth.emplace_back(i < kRows / 2 * kSide ? 1 : 0);
-    outcome.field.height += kRows;
+    outcome.field.add(scene.shade(receivers), brightness);
+    add_white_and_black(kRows, outcome.field);
   }
-  outcome.figures = {
-      {"light, RMS error", rms_difference(outcome.field.ours, outcome.field.truth), 0.015},
-      {"light, largest error", largest_difference(outcome.field.ours, outcome.field.truth), 0.04}};
+  outcome.figures = {{"light, RMS error", outcome.field.rms_error(), 0.015},
+                     {"light, largest error", outcome.field.largest_error(), 0.04}};
   return outcome;
 }
 
@@ -178,15 +182,11 @@ Outcome thin_walls(const Lab& lab) {
       const double side = v < 0.5 ? 1 : -1, away = 0.01 + 0.05 * u;
       return Receiver{{2 * u - 1, v, side * (half + away)}, glm::vec3(0, 0, -side)};
     });
-    for (const Shading& shading : scene.shade(receivers))
-      outcome.field.ours.push_back(brightness(shading));
-    for (unsigned i = 0; i < kRows * kSide; ++i)
-      outcome.field.truth.emplace_back(i < kRows / 2 * kSide ? 1 : 0);
-    outcome.field.height += kRows;
+    outcome.field.add(scene.shade(receivers), brightness);
+    add_white_and_black(kRows, outcome.field);
   }
-  outcome.figures = {
-      {"light, largest error", largest_difference(outcome.field.ours, outcome.field.truth), 0.02},
-      {"light, RMS error", rms_difference(outcome.field.ours, outcome.field.truth), 0.005}};
+  outcome.figures = {{"light, largest error", outcome.field.largest_error(), 0.02},
+                     {"light, RMS error", outcome.field.rms_error(), 0.005}};
   return outcome;
 }
 
@@ -216,8 +216,7 @@ Outcome slit(const Lab& lab) {
   std::vector<glm::vec3> truth;
   for (const Receiver& receiver : receivers)
     truth.emplace_back(kSky * form_factor(receiver, opening));
-  return {.figures = {{"light, RMS error over its mean",
-                       rms_difference(ours, truth) / mean_value(truth), 0.65},
+  return {.figures = {{"light, RMS error over its mean", relative_rms(ours, truth), 0.65},
                       {"light, error of its mean",
                        std::abs(mean_value(ours) / mean_value(truth) - 1), 0.45}},
           .field = {kSide, kSide, ours, truth}};
@@ -249,8 +248,7 @@ Outcome foliage(const Lab& lab) {
   const auto open = values(shaded, openness), truly_open = values(traced, openness);
   return {.figures = {{"occlusion, mean error", std::abs(mean_value(open) - mean_value(truly_open)),
                        0.015},
-                      {"light, RMS error over its mean",
-                       rms_difference(ours, truth) / mean_value(truth), 0.02}},
+                      {"light, RMS error over its mean", relative_rms(ours, truth), 0.02}},
           .field = {kSide, kSide, ours, truth}};
 }
 
