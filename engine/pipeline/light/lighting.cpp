@@ -222,8 +222,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
 
   // Start the sample for check(), without the pilots, and the gather or the rays
   sample_.emplace(request_.check, std::move(compared));
-  RayOptions with = ray_options(options_);
-  with.sky = mirrored_sky_;
+  RayOptions with = own_rays();
   if (receiver_rays() > 0) {
     with.memory_bytes += mirror_bytes_;
   } else {
@@ -244,6 +243,12 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     report_.mirrors = tune_mirrors(*rays_, pilots_compared, mirrors_, *request_.error);
     mirrors_.rays = report_.mirrors->rays;
   }
+}
+
+RayOptions Lighting::own_rays() const {
+  RayOptions with = ray_options(options_);
+  with.sky = mirrored_sky_;
+  return with;
 }
 
 LitReceivers Lighting::shade(std::span<const Receiver> receivers,
@@ -303,9 +308,7 @@ void Lighting::check(const CheckScene& seen) {
   if (request_.check.receivers == 0) return;
   const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
   const Stage stage(report_.seconds, progress_, "check", references, "references");
-  RayOptions with = ray_options(options_);
-  with.sky = mirrored_sky_;
-  report_.check = sample_->compare(lit(), with, mirrors_, seen, executor_, progress_);
+  report_.check = sample_->compare(lit(), own_rays(), mirrors_, seen, executor_, progress_);
 }
 
 }  // namespace ptc

@@ -195,6 +195,9 @@ class Lighting {
   void check(const CheckScene& seen);
 
  private:
+  /// Returns the options of rays that show the sky as it is.
+  [[nodiscard]] RayOptions own_rays() const;
+
   const LightingRequest& request_;
   LightingReport& report_;
   Progress& progress_;
