@@ -17,6 +17,26 @@ std::unique_ptr<PageCache> make_cache(const ContainerReader& container, const Sh
 
 }  // namespace
 
+std::vector<std::size_t> order_along_curve(const Frame& frame, std::span<const Receiver> receivers,
+                                           unsigned variant, const Executor& executor) {
+  struct Placed {
+    MortonKey key;
+    std::size_t index;
+  };
+  std::vector<Placed> placed(receivers.size());
+  executor.for_ranges(receivers.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      placed[i] = {receiver_key(frame, receivers[i].position, variant), i};
+    }
+  });
+  std::ranges::sort(placed, [](const Placed& a, const Placed& b) {
+    return a.key != b.key ? a.key < b.key : a.index < b.index;
+  });
+  std::vector<std::size_t> order(placed.size());
+  std::ranges::transform(placed, order.begin(), [](const Placed& p) { return p.index; });
+  return order;
+}
+
 Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
                const Executor& executor)
     : executor_(executor),
@@ -37,27 +57,6 @@ Gather& Shader::gather(unsigned thread) {
   return *gathers_[thread];
 }
 
-// The indices of the receivers along the Z-curve.
-std::vector<std::size_t> Shader::z_order(std::span<const Receiver> receivers,
-                                         unsigned variant) const {
-  struct Placed {
-    MortonKey key;
-    std::size_t index;
-  };
-  std::vector<Placed> placed(receivers.size());
-  executor_.for_ranges(receivers.size(), 1 << 14, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      placed[i] = {receiver_key(view_.frame(), receivers[i].position, variant), i};
-    }
-  });
-  std::ranges::sort(placed, [](const Placed& a, const Placed& b) {
-    return a.key != b.key ? a.key < b.key : a.index < b.index;
-  });
-  std::vector<std::size_t> order(placed.size());
-  std::ranges::transform(placed, order.begin(), [](const Placed& p) { return p.index; });
-  return order;
-}
-
 void Shader::shade(std::span<const Receiver> receivers, std::span<Shading> results,
                    Progress& progress, unsigned variant) {
   std::vector<std::size_t> counts(variant % grids_.size() + 1);
@@ -76,8 +75,8 @@ void Shader::shade_variants(std::span<const Receiver> receivers, std::span<Shadi
   std::vector<std::size_t> begins(1, 0);
   std::vector<std::vector<std::size_t>> orders;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    orders.push_back(
-        z_order(receivers.subspan(begins[i], counts[i]), static_cast<unsigned>(i % grids_.size())));
+    orders.push_back(order_along_curve(view_.frame(), receivers.subspan(begins[i], counts[i]),
+                                       static_cast<unsigned>(i % grids_.size()), executor_));
     begins.push_back(begins[i] + counts[i]);
     for (std::size_t first = 0; first < counts[i]; first += kBlock)
       blocks.push_back({i, first / kBlock, first});

@@ -44,6 +44,13 @@ struct ShadeOptions {
   [[nodiscard]] unsigned readers() const { return visibility_of_sky() ? 2 : 1; }
 };
 
+/// Returns the indices of receivers along the Z-curve of a variant: the order in which a Shader
+/// cuts them into blocks.
+[[nodiscard]] std::vector<std::size_t> order_along_curve(const Frame& frame,
+                                                         std::span<const Receiver> receivers,
+                                                         unsigned variant,
+                                                         const Executor& executor);
+
 /// Shades receivers block by block, and keeps the page cache and the gathers between calls.
 class Shader {
  public:
@@ -76,8 +83,6 @@ class Shader {
 
  private:
   [[nodiscard]] Gather& gather(unsigned thread);
-  [[nodiscard]] std::vector<std::size_t> z_order(std::span<const Receiver> receivers,
-                                                 unsigned variant) const;
 
   const Executor& executor_;
   SceneView view_;

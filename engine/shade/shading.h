@@ -150,4 +150,21 @@ struct GatherCounts {
   void add(const GatherCounts& other) noexcept;
 };
 
+/// What some receivers of a gather take of its work. Of what a cell does for many, each takes an
+/// equal share.
+struct GatherWork {
+  double receivers = 0;      ///< sum of the weights of the receivers
+  double surfel_blocks = 0;  ///< as GatherCounts::surfel_blocks, weighted
+  double clusters = 0;       ///< as GatherCounts::clusters, weighted
+  double rays = 0;           ///< as GatherCounts::rays, weighted
+
+  /// Adds the work of another gather.
+  void add(const GatherWork& other) noexcept {
+    receivers += other.receivers;
+    surfel_blocks += other.surfel_blocks;
+    clusters += other.clusters;
+    rays += other.rays;
+  }
+};
+
 }  // namespace ptc

@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 
 #include <catch2/catch.hpp>
 
 #include "engine/parallel/thread_pool.h"
+#include "engine/pipeline/quality/candidates.h"
 #include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/pilot_rays.h"
 #include "engine/pipeline/run.h"
 #include "engine/ptc.h"
 #include "tests/shade/gather_scene.h"
@@ -47,7 +50,7 @@ std::vector<double> errors_along_ladder(const Scene& scene) {
   std::vector<Pilot> pilots;
   for (std::size_t i = 0; i < scene.receivers.size(); i += 64) {
     const auto first = scene.receivers.begin() + static_cast<std::ptrdiff_t>(i);
-    pilots.push_back({.receivers = {first, first + 64}});
+    add_pilots(pilots, {first, first + 64}, 0, 1, 1);
   }
   Progress silent;
   std::vector<double> errors;
@@ -146,18 +149,138 @@ TEST_CASE("error: where little of the sky is seen, its light is off by more than
 
 TEST_CASE("tuning: pilots fit into every run and are a small part of a long one",
           "[integration][error]") {
-  CHECK(plan_pilots(0).count == 0);
+  constexpr std::size_t kBlock = 4096;
+  CHECK(plan_pilots(0, kBlock).blocks == 0);
   for (std::uint64_t n = 1; n < 100'000'000; n += 1 + n / 7) {
-    const PilotPlan plan = plan_pilots(n);
-    CAPTURE(n, plan.count, plan.stride, plan.receivers);
-    REQUIRE(plan.count >= 1);
-    REQUIRE(plan.receivers >= 1);
-    REQUIRE(plan.receivers <= plan.stride);
-    REQUIRE(plan.count * plan.stride <= n);
-    REQUIRE(plan.count >= std::min<std::uint64_t>(n, 2));
-    if (n >= 256) REQUIRE(plan.receivers >= 16);
-    if (n >= 70'000) REQUIRE(plan.count * plan.receivers * 15 <= n);
+    const PilotPlan plan = plan_pilots(n, kBlock);
+    CAPTURE(n, plan.blocks, plan.stretches);
+    REQUIRE(plan.blocks >= 1);
+    REQUIRE((plan.blocks - 1) * kBlock < n);
+    REQUIRE(plan.blocks <= 128);
+    REQUIRE(plan.blocks * plan.stretches >= 64);
+    REQUIRE(plan.blocks * plan.stretches <= 128);
   }
+}
+
+TEST_CASE("tuning: a block is cut into pilots that stand for all of it", "[integration][error]") {
+  for (const std::size_t size : {1U, 2U, 3U, 15U, 33U, 500U, 4096U}) {
+    for (const double phase : {0.0, 0.3, 0.999}) {
+      std::vector<Pilot> pilots;
+      add_pilots(pilots, std::vector<Receiver>(size), 3, 64, 2.5, phase);
+      CAPTURE(size, phase, pilots.size());
+      CHECK(pilots.size() ==
+            std::min<std::size_t>(
+                64, std::max<std::size_t>(std::min<std::size_t>(size, 2), size / 16)));
+      std::size_t end = 0;
+      double weight = 0;
+      for (const Pilot& pilot : pilots) {
+        REQUIRE(pilot.begin == end);
+        end = pilot.end;
+        std::set<std::size_t> places, compared;
+        for (const Compared& one : candidates_of(pilot)) {
+          places.insert(one.at);
+          weight += one.weight;
+        }
+        for (const Compared& one : pilot.compared) {
+          compared.insert(one.at);
+          weight += one.weight;
+        }
+        REQUIRE(places.size() == std::min<std::size_t>(64, pilot.end - pilot.begin));
+        REQUIRE(compared.size() == std::min<std::size_t>(8, pilot.end - pilot.begin));
+        REQUIRE(*places.begin() >= pilot.begin);
+        REQUIRE(*places.rbegin() < pilot.end);
+        REQUIRE(*compared.rbegin() < pilot.end);
+      }
+      CHECK(end == size);
+      CHECK(weight == Approx(2 * 2.5 * static_cast<double>(size)));
+    }
+  }
+}
+
+TEST_CASE("tuning: receivers that may be off by much are compared more often, and weigh less",
+          "[integration][error]") {
+  // One candidate in 64 is a hundred times as bright and as far off as the others
+  std::vector<Pilot> pilots;
+  std::vector<std::vector<Shading>> coarse, fine;
+  std::size_t bright = 0, chosen = 0, all = 0;
+  double light = 0, mean = 0, sum = 0;
+  for (int i = 0; i < 64; ++i) add_pilots(pilots, std::vector<Receiver>(4096), 0, 1, 1);
+  for (std::size_t i = 0; i < pilots.size(); ++i) {
+    auto& row = fine.emplace_back();
+    coarse.emplace_back(64);
+    for (std::size_t k = 0; k < 64; ++k) {
+      const float value = (7 * i + 3) % 64 == k ? 100.0F : 1.0F;
+      row.push_back({.irradiance = glm::vec3(value)});
+      mean += static_cast<double>(value) / 64 / 64;
+    }
+  }
+  choose_compared(pilots, coarse, fine);
+  for (std::size_t i = 0; i < pilots.size(); ++i) {
+    const std::vector<Compared> candidates = candidates_of(pilots[i]);
+    for (const Compared& one : pilots[i].compared) {
+      const auto found = std::ranges::find(candidates, one.at, &Compared::at);
+      REQUIRE(found != candidates.end());
+      const double value = static_cast<double>(
+          fine[i][static_cast<std::size_t>(found - candidates.begin())].irradiance.r);
+      if (value > 1) ++bright;
+      CHECK(one.weight <= 4.01 * 4096 / 8);
+      light += one.weight * value;
+      sum += one.weight;
+      ++chosen;
+    }
+    all += pilots[i].compared.size();
+  }
+  CHECK(all == 64 * 8);
+  CHECK(bright == 64);  // evenly spread they would be 8
+  CHECK(light / sum == Approx(mean).epsilon(0.1));
+  CHECK(sum == Approx(64.0 * 4096).epsilon(0.1));
+  // Where nothing differs, all have the same chance
+  for (auto& row : fine) row.assign(64, {});
+  choose_compared(pilots, coarse, fine);
+  for (const Pilot& pilot : pilots) {
+    CHECK(pilot.compared.size() == 8);
+    for (const Compared& one : pilot.compared) CHECK(one.weight == Approx(4096.0 / 8));
+  }
+}
+
+TEST_CASE("tuning: receivers with more noise get more rays, and the noise is what was asked",
+          "[integration][error]") {
+  // A small lamp lights a corner of the floor
+  std::vector<Surfel> surfels = lit_balls();
+  for (Surfel& s : surfels) s.radiance *= 0.1F;
+  surfels.push_back({.position = {-1.2, -1.2, 0.15},
+                     .normal = {0, 0, -1},
+                     .radius = 0.06F,
+                     .radiance = glm::vec3(20)});
+  Scene scene(surfels);
+  add_floor_receivers(scene.receivers, 0.02);
+  std::vector<Pilot> pilots;
+  for (std::size_t i = 0; i < scene.receivers.size(); i += 64) {
+    const auto first = scene.receivers.begin() + static_cast<std::ptrdiff_t>(i);
+    add_pilots(pilots, {first, first + 64}, 0, 1, 1);
+  }
+  const ThreadPool executor(1);
+  Progress silent;
+  RayShader discs(*scene.container, {.memory_bytes = 64U << 20}, executor);
+  const auto noise = [&](const PilotRays& rays) {
+    ErrorSums sums;
+    for (std::size_t i = 0; i < rays.compared.size(); ++i)
+      sums.add(rays.traced[2 * i], rays.traced[2 * i], rays.traced[2 * i + 1]);
+    return std::sqrt(2) * sums.error().relative_noise();
+  };
+  const PilotRays few = trace_evenly(pilots, 256, discs, silent);
+  const double asked = noise(few) / 3;
+  const PilotRays enough = trace_for(pilots, asked, discs, silent);
+  CAPTURE(noise(few), asked, noise(enough), enough.rays);
+  CHECK(noise(enough) < 1.3 * asked);
+  CHECK(noise(enough) > 0.3 * asked);
+  const PilotRays even = trace_evenly(pilots, static_cast<unsigned>(enough.rays), discs, silent);
+  CHECK(noise(enough) < 0.8 * noise(even));
+  CHECK(few.rays_for(noise(few)) == Approx(256));
+  // Where few rays are enough, they are all
+  const PilotRays same = trace_for(pilots, 1.01 * noise(few), discs, silent);
+  CHECK(same.rays == 256);
+  CHECK(same.traced[5].irradiance == few.traced[5].irradiance);
 }
 
 TEST_CASE("tuning: the error falls along the ladder", "[integration][error]") {

@@ -376,6 +376,48 @@ TEST_CASE("gather: scenes ten thousand kilometres apart shade in one call as eac
   }
 }
 
+TEST_CASE("gather: receivers of weight 0 have their part in cells, and take no work",
+          "[shade][gather]") {
+  Scene scene(small_scene(0.04));
+  add_floor_receivers(scene.receivers, 0.04);
+  const SceneView view(*scene.container);
+  PageCache cache(*scene.container, {.memory_bytes = 64U << 20, .threads = 3});
+  const DirectionGrid grid(GatherOptions().resolution, {});
+  const std::size_t n = scene.receivers.size();
+  std::vector<Shading> all(n);
+  Gather whole(view, cache, {});
+  whole.shade(scene.receivers, all, grid);
+  // Some have results, the same ones
+  std::vector<float> weights(n);
+  std::vector<Shading> some(n, Shading{.occlusion = -1});
+  for (std::size_t i = 5; i < n; i += 97) weights[i] = 97;
+  Gather part(view, cache, {});
+  part.shade(scene.receivers, some, grid, weights);
+  std::size_t wanted = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (weights[i] == 0) {
+      REQUIRE(some[i].occlusion == -1);
+      continue;
+    }
+    ++wanted;
+    REQUIRE(some[i].occlusion == all[i].occlusion);
+    REQUIRE(some[i].irradiance == all[i].irradiance);
+    REQUIRE(some[i].bent_normal == all[i].bent_normal);
+  }
+  CHECK(part.counts().receivers == wanted);
+  CHECK(part.counts().clusters < whole.counts().clusters / 3);
+  // Their shares tell what the whole call takes
+  CHECK(part.work().receivers == Approx(n).epsilon(0.02));
+  CHECK(part.work().clusters == Approx(whole.counts().clusters).epsilon(0.1));
+  CHECK(part.work().surfel_blocks == Approx(whole.counts().surfel_blocks).epsilon(0.1));
+  CHECK(whole.work().receivers == 0);
+  Gather each(view, cache, {});
+  each.shade(scene.receivers, some, grid, std::vector<float>(n, 1));
+  CHECK(each.work().clusters == Approx(whole.counts().clusters).epsilon(1e-6));
+  CHECK(each.work().surfel_blocks == Approx(whole.counts().surfel_blocks).epsilon(1e-6));
+  CHECK(each.counts().cells == whole.counts().cells);
+}
+
 TEST_CASE("gather: receivers without anything near share the sums over one buffer",
           "[shade][gather]") {
   std::vector<Surfel> surfels;

@@ -189,8 +189,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     options_.gather.resolution = kSparseResolution;
   }
   if (request_.error || request_.estimate) {
-    const std::vector<Pilot> pilots = find_pilots();
-    pilots_compared = compared_of(pilots);
+    std::vector<Pilot> pilots = find_pilots();
     std::vector<Shading> traced;  // two results by rays for each compared receiver
 
     // Choose the settings
@@ -205,6 +204,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
       options_.gather = report_.tuning->gather;
       options_.gather.around = around;
     }
+    pilots_compared = compared_of(pilots);
 
     // Fit the estimates; tune() has traced the pilots already
     if (request_.estimate) {
@@ -218,6 +218,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     }
   }
 
+  return_freed_memory();  // that pilots took: what comes next takes it again
   report_.settings = options_.gather;
 
   // Start the sample for check(), without the pilots, and the gather or the rays

@@ -25,14 +25,14 @@ void ErrorSums::Quantity::add(const Quantity& other) {
   mean += other.mean;
 }
 
-void ErrorSums::add(const Shading& ours, const Shading& a, const Shading& b) {
+void ErrorSums::add(const Shading& ours, const Shading& a, const Shading& b, double weight) {
   const auto value = [](float v) { return static_cast<double>(v); };
-  receivers_ += 1;
-  occlusion_.add(value(ours.occlusion), value(a.occlusion), value(b.occlusion), 1);
+  receivers_ += weight;
+  occlusion_.add(value(ours.occlusion), value(a.occlusion), value(b.occlusion), weight);
   for (int c = 0; c < 3; ++c) {
     irradiance_.add(value(ours.irradiance[c]), value(a.irradiance[c]), value(b.irradiance[c]),
-                    1.0 / 3);
-    sky_ += (value(a.sky[c]) + value(b.sky[c])) / 6;
+                    weight / 3);
+    sky_ += weight * (value(a.sky[c]) + value(b.sky[c])) / 6;
   }
 }
 

@@ -22,8 +22,9 @@ namespace ptc {
 class ErrorSums {
  public:
   /// Adds a receiver.
-  /// @param a, b  its results by rays of different seeds
-  void add(const Shading& ours, const Shading& a, const Shading& b);
+  /// @param a, b    its results by rays of different seeds
+  /// @param weight  how many receivers it stands for
+  void add(const Shading& ours, const Shading& a, const Shading& b, double weight = 1);
   /// Adds the receivers of other sums.
   void add(const ErrorSums& other);
   /// Returns the errors over all receivers; zeros when there are none.

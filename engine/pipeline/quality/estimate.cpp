@@ -144,14 +144,20 @@ EstimateWorth worth_of(std::span<const ErrorEstimate> estimates, float ErrorEsti
 /// Fits the line of one quantity to the compared receivers.
 /// @param shaded, other  their results with both variants
 template <class QuantityOf>
-ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> other,
-                  std::span<const Shading> traced, const QuantityOf& quantity_of) {
+ErrorLine line_of(std::span<const Pilot> pilots, std::span<const Shading> shaded,
+                  std::span<const Shading> other, std::span<const Shading> traced,
+                  const QuantityOf& quantity_of) {
+  std::vector<double> weights;
+  for (const Pilot& pilot : pilots) {
+    for (const Compared& one : pilot.compared) weights.push_back(one.weight);
+  }
   std::vector<ErrorSample> samples;
   for (std::size_t i = 0; i < shaded.size(); ++i) {
     const Quantity ours = quantity_of(shaded[i]);
-    samples.push_back({.squared_difference = squared_difference(ours, quantity_of(other[i])),
-                       .squared_error = product(ours, quantity_of(traced[2 * i]),
-                                                quantity_of(traced[2 * i + 1]))});
+    samples.push_back(
+        {.squared_difference = squared_difference(ours, quantity_of(other[i])),
+         .squared_error = product(ours, quantity_of(traced[2 * i]), quantity_of(traced[2 * i + 1])),
+         .weight = weights[i]});
   }
   return fit_errors(samples);
 }
@@ -160,13 +166,13 @@ ErrorLine line_of(std::span<const Shading> shaded, std::span<const Shading> othe
 
 ErrorLine fit_errors(std::span<const ErrorSample> samples) {
   // Sum the moments of differences d and errors e
-  const auto n = static_cast<double>(samples.size());
-  double d = 0, e = 0, dd = 0, de = 0;
+  double n = 0, d = 0, e = 0, dd = 0, de = 0;
   for (const ErrorSample& s : samples) {
-    d += s.squared_difference;
-    e += s.squared_error;
-    dd += s.squared_difference * s.squared_difference;
-    de += s.squared_difference * s.squared_error;
+    n += s.weight;
+    d += s.weight * s.squared_difference;
+    e += s.weight * s.squared_error;
+    dd += s.weight * s.squared_difference * s.squared_difference;
+    de += s.weight * s.squared_difference * s.squared_error;
   }
 
   // Fit by least squares; fall back to a flat line where the slope is not positive, and to a line
@@ -220,8 +226,8 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
   const std::vector<Shading> ours = shade_compared(view, pilots, 0, executor);
   const std::vector<Shading> other = shade_compared(view, pilots, 1, executor);
   report_.cpu_seconds = cpu_seconds() - before;
-  occlusion_ = line_of(ours, other, traced, occlusion_of);
-  irradiance_ = line_of(ours, other, traced, irradiance_of);
+  occlusion_ = line_of(pilots, ours, other, traced, occlusion_of);
+  irradiance_ = line_of(pilots, ours, other, traced, irradiance_of);
   other_ = std::make_unique<Shader>(scene, options_, executor);
 }
 
@@ -236,11 +242,8 @@ std::vector<Shading> Estimator::shade_compared(const SceneView& view, std::span<
   executor.for_each(pilots.size(), [&](std::size_t i, unsigned thread) {
     if (!gathers[thread])
       gathers[thread] = std::make_unique<Gather>(view, *cache_, options_.gather);
-    const Pilot& pilot = pilots[i];
-    std::vector<Shading> results(pilot.receivers.size());
-    gathers[thread]->shade(pilot.receivers, results, *grids[(pilot.variant + turn) % grids.size()]);
-    for (std::size_t k = 0; k < pilot.compared(); ++k)
-      compared[i].push_back(results[pilot.compared_at(k)]);
+    compared[i] = shade_some(*gathers[thread], pilots[i], pilots[i].compared,
+                             *grids[(pilots[i].variant + turn) % grids.size()]);
   });
   std::vector<Shading> all;
   for (const std::vector<Shading>& some : compared) all.insert(all.end(), some.begin(), some.end());

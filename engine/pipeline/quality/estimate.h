@@ -41,10 +41,11 @@ struct ErrorLine {
 struct ErrorSample {
   double squared_difference = 0;  ///< of the results of two variants
   double squared_error = 0;       ///< unbiased, so that a single one may be negative
+  double weight = 1;              ///< how many receivers it stands for
 };
 
-/// Fits a line to samples by least squares, with neither coefficient negative. The mean of the line
-/// over the samples is the mean of their errors. Both coefficients are 0 when there are no samples
+/// Fits a line to samples by least squares, with neither coefficient negative. The weighted mean of
+/// the line over the samples is that of their errors. Both coefficients are 0 when there are no samples
 /// or that mean is not positive.
 [[nodiscard]] ErrorLine fit_errors(std::span<const ErrorSample> samples);
 

@@ -1,32 +1,74 @@
 #include "engine/pipeline/quality/pilots.h"
 
-namespace ptc {
+#include <utility>
 
-PilotPlan plan_pilots(std::uint64_t receivers) {
-  constexpr std::uint64_t kMinPilots = 64, kMaxPilots = 128;
-  constexpr std::uint64_t kMinLength = 64, kMaxLength = 256;  // receivers of a pilot
-  constexpr std::uint64_t kMinStride = 16;  // a small run has fewer pilots instead of shorter ones
-  constexpr std::uint64_t kShare = 16;      // one in 16 receivers is in a pilot
+namespace ptc {
+namespace {
+
+constexpr std::size_t kMaxBlocks = 128;      // whose receivers are in memory at once
+constexpr std::size_t kEnoughPilots = 64;    // blocks are cut into stretches below that
+constexpr std::size_t kLeastReceivers = 16;  // of a stretch: a small run has fewer pilots instead
+
+/// Returns the place of the k-th of some receivers that are evenly spread over a stretch.
+std::size_t place_of(std::size_t k, std::size_t count, std::size_t length, double phase) {
+  const double share = static_cast<double>(length) / static_cast<double>(count);
+  return std::min(static_cast<std::size_t>((static_cast<double>(k) + phase) * share), length - 1);
+}
+
+}  // namespace
+
+std::size_t Pilot::candidate_at(std::size_t k) const noexcept {
+  return begin + place_of(k, candidates(), end - begin, phase);
+}
+
+PilotPlan plan_pilots(std::uint64_t receivers, std::size_t block) {
   if (receivers == 0) return {};
-  const std::uint64_t room =
-      std::max(std::min<std::uint64_t>(receivers, 2), receivers / kMinStride);
-  const std::uint64_t count =
-      std::min(std::clamp(receivers / (kShare * kMaxLength), kMinPilots, kMaxPilots), room);
-  const std::uint64_t stride = receivers / count;
-  const std::uint64_t length = std::clamp(stride / kShare, kMinLength, kMaxLength);
-  return {.count = static_cast<std::size_t>(count),
-          .stride = stride,
-          .receivers = static_cast<std::size_t>(std::min(stride, length))};
+  const std::uint64_t all = (receivers + block - 1) / block;
+  const auto blocks = static_cast<std::size_t>(std::min<std::uint64_t>(all, kMaxBlocks));
+  return {.blocks = blocks, .stretches = (kEnoughPilots + blocks - 1) / blocks};
+}
+
+void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigned variant,
+                std::size_t stretches, double share, double phase) {
+  block.shrink_to_fit();
+  const std::size_t size = block.size();
+  const std::size_t most = std::max(std::min<std::size_t>(size, 2), size / kLeastReceivers);
+  const std::size_t count = std::clamp<std::size_t>(stretches, 1, most);
+  const auto shared = std::make_shared<const std::vector<Receiver>>(std::move(block));
+  for (std::size_t i = 0; i < count; ++i) {
+    Pilot pilot{.block = shared,
+                .variant = variant,
+                .begin = i * size / count,
+                .end = (i + 1) * size / count,
+                .phase = phase};
+    const std::size_t length = pilot.end - pilot.begin;
+    const std::size_t compared = std::min(Pilot::kCompared, length);
+    pilot.weight = static_cast<double>(length) * share;
+    for (std::size_t k = 0; k < compared; ++k) {
+      pilot.compared.push_back({.at = pilot.begin + place_of(k, compared, length, phase),
+                                .weight = pilot.weight / static_cast<double>(compared)});
+    }
+    pilots.push_back(std::move(pilot));
+  }
 }
 
 std::vector<Receiver> compared_of(std::span<const Pilot> pilots) {
   std::vector<Receiver> compared;
   for (const Pilot& pilot : pilots) {
-    for (std::size_t k = 0; k < pilot.compared(); ++k) {
-      compared.push_back(pilot.receivers[pilot.compared_at(k)]);
-    }
+    for (const Compared& one : pilot.compared) compared.push_back((*pilot.block)[one.at]);
   }
   return compared;
+}
+
+std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot, std::span<const Compared> some,
+                                const DirectionGrid& grid) {
+  const std::vector<Receiver>& block = *pilot.block;
+  std::vector<float> weights(block.size());
+  for (const Compared& one : some) weights[one.at] = static_cast<float>(one.weight);
+  std::vector<Shading> all(block.size()), results;
+  gather.shade(block, all, grid, weights);
+  for (const Compared& one : some) results.push_back(all[one.at]);
+  return results;
 }
 
 }  // namespace ptc

@@ -1,53 +1,81 @@
 // Pilots: receivers of a run that stand for all of them when settings are chosen.
 //
-//   receivers of the run   |---------------|---------------|---------------|---   stride
-//   pilots                      |=====|         |=====|         |=====|           64 to 128 of them
-//   compared with rays           ' ' '           ' ' '           ' ' '            8 in each
+//   receivers of the run   |-------|-------|-------|-------|-------|-------|-------|   blocks
+//   pilots                         |=======|               |=======|                   stretches
+//   candidates                      ' ' ' '                 ' ' ' '                    64 in each
+//   compared with rays              '   '                     '                        8 of them
+//
+// A pilot knows the whole block that the run shades at once, so that its receivers get the results
+// that they get in the run, whatever they share with others there.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <set>
 #include <span>
 #include <vector>
 
-#include "engine/shade/shading.h"
+#include "engine/shade/gather/gather.h"
 
 namespace ptc {
 
-/// A group of neighbours among the receivers of a run. All are shaded together, as in the run
-/// itself; some are compared with rays.
+/// A receiver of a pilot that is compared with rays.
+struct Compared {
+  std::size_t at = 0;  ///< its index in the block
+  double weight = 1;   ///< how many receivers of the run it stands for
+};
+
+/// A stretch of neighbours in a block of a run. Some of them are compared with rays.
 struct Pilot {
-  static constexpr std::size_t kCompared = 8;  ///< maximum of receivers that are compared
+  static constexpr std::size_t kCandidates = 64;  ///< maximum of receivers to choose from
+  static constexpr std::size_t kCompared = 8;     ///< compared ones of a pilot, in the mean
 
-  std::vector<Receiver> receivers;
-  unsigned variant = 0;  ///< variant that shades them, as for Shader::shade()
+  /// Receivers that the run shades at once, along the Z-curve; not null.
+  std::shared_ptr<const std::vector<Receiver>> block;
+  unsigned variant = 0;            ///< variant that shades them, as for Shader::shade()
+  std::size_t begin = 0, end = 0;  ///< the stretch of the block, not empty
+  double weight = 1;               ///< how many receivers of the run the stretch stands for
+  double phase = 0.5;              ///< where in its share of the stretch a candidate lies, 0 to 1
+  std::vector<Compared> compared;
 
-  /// Returns the number of receivers that are compared with rays: kCompared, or all when there are
-  /// fewer.
-  [[nodiscard]] std::size_t compared() const noexcept {
-    return std::min(kCompared, receivers.size());
+  /// Returns the number of receivers to choose from: kCandidates, or all when there are fewer.
+  [[nodiscard]] std::size_t candidates() const noexcept {
+    return std::min(kCandidates, end - begin);
   }
-  /// Returns the index of the k-th compared receiver. They are evenly spread.
-  [[nodiscard]] std::size_t compared_at(std::size_t k) const noexcept {
-    return (2 * k + 1) * receivers.size() / (2 * compared());
-  }
+  /// Returns the index in the block of the k-th candidate. They are evenly spread.
+  [[nodiscard]] std::size_t candidate_at(std::size_t k) const noexcept;
 };
 
-/// The number and the length of the pilots of a run.
+/// How many blocks of a run are pilots, and into how many stretches each is cut.
 struct PilotPlan {
-  std::size_t count = 0;      ///< number of pilots; 0 only for a run without receivers
-  std::uint64_t stride = 0;   ///< receivers from the first of one pilot to the first of the next
-  std::size_t receivers = 0;  ///< length of each pilot, at most `stride`
+  std::size_t blocks = 0;     ///< 0 only for a run without receivers
+  std::size_t stretches = 0;  ///< of a block: 1 where there are many blocks
 };
 
-/// Chooses the number and the length of the pilots for a run.
+/// Chooses the number of the pilots of a run.
 /// @param receivers  number of receivers of the run
-[[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers);
+/// @param block      receivers that it shades at once, at most
+[[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers, std::size_t block);
+
+/// Cuts a block into pilots. As many receivers are compared in each, evenly spread.
+/// @param block      not empty
+/// @param stretches  at most: none is shorter than 16 receivers, unless the block is
+/// @param share      how many receivers of the run one of the block stands for
+/// @param phase      as Pilot::phase
+void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigned variant,
+                std::size_t stretches, double share, double phase = 0.5);
 
 /// Returns the compared receivers of all pilots, in order.
 [[nodiscard]] std::vector<Receiver> compared_of(std::span<const Pilot> pilots);
+
+/// Shades some receivers of a pilot's block as the run does.
+/// @param grid  of the pilot's variant
+/// @return      one result for each of them, in their order
+[[nodiscard]] std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot,
+                                              std::span<const Compared> some,
+                                              const DirectionGrid& grid);
 
 /// A set of receivers; those at the same position count as one.
 class ReceiverPlaces {

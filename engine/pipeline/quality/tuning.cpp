@@ -1,5 +1,9 @@
 // Bisection over a ladder of settings, with a bound on the error at each step.
 //
+// A few receivers may be off by far more than all others, and decide about the error of the run. So
+// that they are found, many candidates are shaded at two coarse rungs, and those are compared more
+// often that receive much light, or on which the two rungs differ; all the less does each count.
+//
 // Half of the pilots choose a rung, the other half confirm it: the rung that looks best at some
 // pilots looks too good at them. A rung counts as good enough when its error is below what is asked
 // in 95 of 100 resamples of the pilots, not just in their mean. The noise of the rays does not
@@ -14,10 +18,13 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <random>
 
 #include "engine/base/memory.h"
+#include "engine/pipeline/quality/candidates.h"
 #include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/pilot_rays.h"
 #include "engine/trace/ray_shader.h"
 
 namespace ptc {
@@ -41,21 +48,15 @@ constexpr std::array kLadder{
 constexpr unsigned kResamples = 200;
 constexpr unsigned kHigh = 190, kLow = kResamples - 1 - kHigh;
 
-// The rays of a result form a square. Its side in the first attempt, its maximum, and the noise of
-// one result over the error that is asked for, above which a second attempt is made
-constexpr unsigned kFirstSide = 16, kMaxSide = 128;
-constexpr double kNoise = 0.7;
-
 // Microseconds of CPU for a receiver, without the reading of pages, fitted to 81 runs of five
 // scenes and 1,000 to 200,000 receivers: the gather for a block of surfels, a cluster, and the
 // pixels of a direction buffer of 16 a side; rays for the list of a receiver, and for a ray.
 constexpr double kBlockCost = 0.17, kClusterCost = 0.037, kPixelsCost = 0.63;
 constexpr double kListCost = 50, kRayCost = 0.35;
 
-// The noise of n rays falls as n^-0.6. Attempts to find how many confirm what is asked, the growth
-// of their number from one to the next, and what they are multiples of
-constexpr double kNoiseFall = 0.6;
-constexpr unsigned kAttempts = 3;
+// Attempts to find how many rays confirm what is asked, the least growth of their number from one
+// to the next, and what they are multiples of
+constexpr unsigned kAttempts = 4;
 constexpr double kGrowth = 1.3;
 constexpr unsigned kRayStep = 32;
 // Most rays of a receiver: their memory fits what is charged for a thread that gathers
@@ -69,42 +70,44 @@ struct Measured {
   double low = 0, high = 0;
 };
 
-/// The search of tune() and climb(): trace, then begin_shading(), then choose() and measure(), and
-/// at the end choose_rays().
+// The rungs at which candidates are shaded
+constexpr std::array<std::size_t, 2> kSurveyed{0, 3};
+
+/// The search of tune() and climb(): survey() if it chooses what is compared, trace, then
+/// begin_shading(), then choose() and measure(), and at the end choose_rays().
 class Tuner {
  public:
+  /// @param pilots  must outlive this, as must the others
   Tuner(const ContainerReader& scene, const ShadeOptions& options, std::span<const Pilot> pilots,
         const Executor& executor)
       : scene_(scene),
+        view_(scene),
         options_(options),
         pilots_(pilots),
         executor_(executor),
-        compared_(compared_of(pilots)),
         errors_(ladder().size()),
-        counts_(ladder().size()) {}
+        works_(ladder().size()) {}
 
-  /// Traces as many rays as it takes for the noise of each result to be below the error that is
-  /// asked for. That is enough: noise is averaged out over some hundred receivers.
-  /// @return  number of rays of each of the two results of a receiver
-  unsigned trace_for(double asked, Progress& progress) {
-    RayShader discs(scene_, ray_options(options_), executor_);
-    unsigned side = kFirstSide;
-    trace(discs, side, progress);
-    const double noise = noise_of_half();
-    if (noise > kNoise * asked) {
-      side = static_cast<unsigned>(
-          std::min<double>(kMaxSide, std::ceil(side * noise / (kNoise * asked))));
-      trace(discs, side, progress);
-    }
-    return side * side;
+  /// Chooses among the candidates of all pilots those that are compared.
+  /// @param pilots  those that it was made for
+  void survey(std::span<Pilot> pilots) {
+    std::vector<std::size_t> all(pilots.size());
+    std::iota(all.begin(), all.end(), 0);
+    std::vector<std::vector<Compared>> candidates;
+    for (const Pilot& pilot : pilots) candidates.push_back(candidates_of(pilot));
+    const auto of = [&](std::size_t i) -> std::span<const Compared> { return candidates[i]; };
+    begin_shading();
+    const auto coarse = shade(kSurveyed[0], all, of), fine = shade(kSurveyed[1], all, of);
+    cache_.reset();
+    return_freed_memory();
+    choose_compared(pilots, coarse, fine);
   }
 
-  /// Traces all compared receivers.
-  /// @param side  side of the square of rays of a result
-  void trace(RayShader& discs, unsigned side, Progress& progress) {
-    const std::vector<Receiver> twice = two_of_each(compared_);
-    traced_.resize(twice.size());
-    discs.trace(twice, side * side, 0, traced_, progress);
+  /// Traces the compared receivers, as trace_for() or trace_evenly().
+  template <class Trace>
+  void trace(const Trace& trace_with) {
+    RayShader discs(scene_, ray_options(options_), executor_);
+    rays_ = trace_with(discs);
   }
 
   /// Gives the memory of the rays, which are gone, to a page cache.
@@ -114,6 +117,17 @@ class Tuner {
         scene_, CacheOptions{.memory_bytes = options_.cache_bytes,
                              .threads = executor_.threads() * options_.readers(),
                              .back_end = options_.back_end});
+  }
+
+  /// Shades all receivers of the pilots' stretches at a rung.
+  void shade_whole_blocks(std::size_t rung) {
+    std::vector<std::size_t> pilots(pilots_.size());
+    std::iota(pilots.begin(), pilots.end(), 0);
+    std::vector<std::vector<Compared>> whole(pilots_.size());
+    for (std::size_t i = 0; i < pilots_.size(); ++i) {
+      for (std::size_t at = pilots_[i].begin; at < pilots_[i].end; ++at) whole[i].push_back({at});
+    }
+    shade(rung, pilots, [&](std::size_t i) -> std::span<const Compared> { return whole[i]; });
   }
 
   /// Returns the cheapest rung that meets `asked` at the choosing and at the confirming pilots; the
@@ -127,21 +141,22 @@ class Tuner {
   /// Finds how many rays of a receiver meet `asked`, as choose() finds a rung, if they cost less
   /// than the gather at a rung. Frees the page cache: no rung can be measured afterwards.
   /// @return  0 when there are none
-  unsigned choose_rays(double asked, std::size_t rung, unsigned traced, Progress& progress) {
-    const double gather = gather_cost(rung);
-    double rays = traced * std::pow(noise_of_half() / asked, 1 / kNoiseFall);
+  unsigned choose_rays(double asked, std::size_t rung, Progress& progress) {
+    const double gather = gather_cost(ladder()[rung], works_[rung]);
+    double rays = rays_.rays_for(asked);
     cache_.reset();
     return_freed_memory();
     RayShader discs(scene_, ray_options(options_), executor_);
-    own_.resize(compared_.size());
-    for (unsigned attempt = 0; attempt < kAttempts; ++attempt, rays *= kGrowth) {
+    own_.resize(rays_.compared.size());
+    for (unsigned attempt = 0; attempt < kAttempts; ++attempt) {
       const auto steps =
           static_cast<unsigned>(std::ceil(std::min<double>(rays, kMostRays) / kRayStep));
       const unsigned count = kRayStep * std::max(1U, steps);
-      if (kListCost + kRayCost * count >= gather) return 0;
-      discs.trace(compared_, count, kOwnSeed, own_, progress);
-      if (bound(own_errors(kChoosing)) <= asked && bound(own_errors(kConfirming)) <= asked)
-        return count;
+      if (ray_cost(count) >= gather) return 0;
+      discs.trace(rays_.compared, count, kOwnSeed, own_, progress);
+      const double error = std::max(bound(own_errors(kChoosing)), bound(own_errors(kConfirming)));
+      if (error <= asked) return count;
+      rays = std::max(kGrowth * count, count * rays_.rays_for(asked) / rays_.rays_for(error));
     }
     return 0;
   }
@@ -163,8 +178,7 @@ class Tuner {
   }
 
   [[nodiscard]] std::uint64_t shaded() const { return shaded_; }
-  [[nodiscard]] std::span<const Receiver> compared() const { return compared_; }
-  [[nodiscard]] std::span<const Shading> traced() const { return traced_; }
+  [[nodiscard]] const PilotRays& rays() const { return rays_; }
 
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
@@ -186,14 +200,6 @@ class Tuner {
       at = error > 0 ? rung_of(ladder()[at].usual_error * asked / error) : 0;
     }
     return high;
-  }
-
-  /// Returns the noise of one of the two results of a receiver, as CheckError::relative().
-  [[nodiscard]] double noise_of_half() const {
-    ErrorSums sums;
-    for (std::size_t i = 0; i < compared_.size(); ++i)
-      sums.add(traced_[2 * i], traced_[2 * i], traced_[2 * i + 1]);
-    return std::sqrt(2) * sums.error().relative_noise();
   }
 
   /// Returns the first rung whose usual error is at most `error`; the size of the ladder when there
@@ -234,47 +240,46 @@ class Tuner {
   /// Returns the errors of each pilot of a part at a rung, shaded at the first call.
   const std::vector<ErrorSums>& errors_of(std::size_t rung, std::size_t part) {
     std::vector<ErrorSums>& errors = errors_[rung][part];
-    if (errors.empty()) errors = shade(rung, part);
+    if (!errors.empty() || pilots_.size() <= part) return errors;
+    std::vector<std::size_t> pilots;
+    for (std::size_t i = part; i < pilots_.size(); i += 2) pilots.push_back(i);
+    const auto results = shade(rung, pilots, [&](std::size_t i) -> std::span<const Compared> {
+      return pilots_[i].compared;
+    });
+    for (std::size_t k = 0; k < pilots.size(); ++k) {
+      errors.push_back(
+          compare(pilots[k], [&](std::size_t i) -> const Shading& { return results[k][i]; }));
+    }
     return errors;
   }
 
-  /// Shades the pilots of a part at a rung. @return the errors of each pilot
-  std::vector<ErrorSums> shade(std::size_t rung, std::size_t part) {
+  /// Shades receivers of some pilots at a rung.
+  /// @param some_of  returns the receivers of a pilot: some_of(number)
+  /// @return         their results, pilot by pilot
+  template <class SomeOf>
+  std::vector<std::vector<Shading>> shade(std::size_t rung, std::span<const std::size_t> pilots,
+                                          const SomeOf& some_of) {
     const GatherOptions gather = ladder()[rung].options(options_.gather);
     const VisibilityMaker visibility = options_.visibility_of_sky();
-    const SceneView view(scene_);
     std::vector<std::unique_ptr<DirectionGrid>> grids;
     for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
       grids.push_back(std::make_unique<DirectionGrid>(gather.resolution, options_.sky, i));
     }
     std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
-    std::vector<ErrorSums> errors((pilots_.size() + 1 - part) / 2);
-    executor_.for_each(errors.size(), [&](std::size_t i, unsigned thread) {
+    std::vector<std::vector<Shading>> results(pilots.size());
+    executor_.for_each(pilots.size(), [&](std::size_t k, unsigned thread) {
       if (!gathers[thread])
-        gathers[thread] = std::make_unique<Gather>(view, *cache_, gather, visibility);
-      const std::size_t index = 2 * i + part;
-      const Pilot& pilot = pilots_[index];
-      std::vector<Shading> results(pilot.receivers.size());
-      gathers[thread]->shade(pilot.receivers, results, *grids[pilot.variant % grids.size()]);
-      errors[i] = compare(
-          index, [&](std::size_t k) -> const Shading& { return results[pilot.compared_at(k)]; });
+        gathers[thread] = std::make_unique<Gather>(view_, *cache_, gather, visibility);
+      const Pilot& pilot = pilots_[pilots[k]];
+      results[k] = shade_some(*gathers[thread], pilot, some_of(pilots[k]),
+                              *grids[pilot.variant % grids.size()]);
     });
     for (const auto& done : gathers) {
-      if (done) counts_[rung].add(done->counts());
+      if (!done) continue;
+      works_[rung].add(done->work());
+      shaded_ += done->counts().receivers;
     }
-    for (std::size_t i = part; i < pilots_.size(); i += 2) shaded_ += pilots_[i].receivers.size();
-    return errors;
-  }
-
-  /// Returns what the gather costs at a rung, microseconds a receiver.
-  [[nodiscard]] double gather_cost(std::size_t rung) const {
-    const GatherCounts& counts = counts_[rung];
-    const double side = ladder()[rung].resolution / 16.0;
-    const double sum = kBlockCost * static_cast<double>(counts.surfel_blocks) +
-                       kClusterCost * static_cast<double>(counts.clusters) +
-                       kRayCost * static_cast<double>(counts.rays);
-    return sum / static_cast<double>(std::max<std::uint64_t>(1, counts.receivers)) +
-           kPixelsCost * side * side;
+    return results;
   }
 
   /// Returns the errors of each pilot of a part at the results by rays.
@@ -291,7 +296,7 @@ class Tuner {
   /// Returns the index of the first compared receiver of a pilot.
   [[nodiscard]] std::size_t first_of(std::size_t pilot) const {
     std::size_t first = 0;
-    for (std::size_t i = 0; i < pilot; ++i) first += pilots_[i].compared();
+    for (std::size_t i = 0; i < pilot; ++i) first += pilots_[i].compared.size();
     return first;
   }
 
@@ -300,25 +305,26 @@ class Tuner {
   template <class Result>
   [[nodiscard]] ErrorSums compare(std::size_t index, const Result& result) const {
     const std::size_t first = 2 * first_of(index);
+    const std::vector<Compared>& compared = pilots_[index].compared;
     ErrorSums sums;
-    for (std::size_t k = 0; k < pilots_[index].compared(); ++k) {
-      const Shading* rays = &traced_[first + 2 * k];
-      sums.add(result(k), rays[0], rays[1]);
+    for (std::size_t k = 0; k < compared.size(); ++k) {
+      const Shading* rays = &rays_.traced[first + 2 * k];
+      sums.add(result(k), rays[0], rays[1], compared[k].weight);
     }
     return sums;
   }
 
   const ContainerReader& scene_;
+  const SceneView view_;
   const ShadeOptions& options_;
   std::span<const Pilot> pilots_;
   const Executor& executor_;
   std::unique_ptr<PageCache> cache_;
-  std::vector<Receiver> compared_;  // compared receivers of all pilots, in order
-  std::vector<Shading> traced_;     // two results by rays for each of them
+  PilotRays rays_;
   // By rung and part, one for each pilot; empty where the pilots are not shaded yet
   std::vector<std::array<std::vector<ErrorSums>, 2>> errors_;
-  std::vector<GatherCounts> counts_;  // by rung
-  std::vector<Shading> own_;          // results of the compared receivers by rays
+  std::vector<GatherWork> works_;  // by rung
+  std::vector<Shading> own_;       // results of the compared receivers by rays
   std::uint64_t shaded_ = 0;
 };
 
@@ -328,14 +334,27 @@ std::span<const Rung> ladder() {
   return kLadder;
 }
 
+double gather_cost(const Rung& rung, const GatherWork& work) {
+  const double side = rung.resolution / 16.0;
+  const double sum =
+      kBlockCost * work.surfel_blocks + kClusterCost * work.clusters + kRayCost * work.rays;
+  return (work.receivers > 0 ? sum / work.receivers : 0) + kPixelsCost * side * side;
+}
+
+double ray_cost(unsigned rays) {
+  return kListCost + kRayCost * rays;
+}
+
 TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
-                  bool by_rays, std::span<const Pilot> pilots, const Executor& executor,
+                  bool by_rays, std::span<Pilot> pilots, const Executor& executor,
                   Progress& progress, ReceiverPlaces& compared, std::vector<Shading>& traced) {
-  // Trace rays at the pilots
+  // Choose what is compared, and trace rays there
   Tuner tuner(scene, options, pilots, executor);
-  for (const Receiver& receiver : tuner.compared()) compared.add(receiver);
+  const double start = cpu_seconds();
+  tuner.survey(pilots);
   const double before = cpu_seconds();
-  const unsigned rays = tuner.trace_for(asked, progress);
+  tuner.trace([&](RayShader& discs) { return trace_for(pilots, asked, discs, progress); });
+  for (const Receiver& receiver : tuner.rays().compared) compared.add(receiver);
   const double tracing_done = cpu_seconds();
 
   // Choose the setting
@@ -350,8 +369,8 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
                       .gather = ladder()[rung].options(options.gather),
                       .setting = static_cast<unsigned>(rung),
                       .settings = static_cast<unsigned>(ladder().size()),
-                      .pilots = tuner.compared().size(),
-                      .rays = 2 * rays,
+                      .pilots = tuner.rays().compared.size(),
+                      .rays = static_cast<unsigned>(std::lround(2 * tuner.rays().rays)),
                       .ray_cpu_seconds = tracing_done - before};
   const auto tell = [&](const Measured& measured) {
     report.measured = measured.error;
@@ -360,19 +379,19 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
   };
   tell(tuner.measure(rung, !met || pilots.size() < 2));
   report.shaded = tuner.shaded();
-  report.shade_cpu_seconds = cpu_seconds() - tracing_done;
+  report.shade_cpu_seconds = before - start + cpu_seconds() - tracing_done;
 
   // See whether rays cost less
   if (by_rays) {
     const double before_rays = cpu_seconds();
-    report.receiver_rays = tuner.choose_rays(asked, rung, rays, progress);
+    report.receiver_rays = tuner.choose_rays(asked, rung, progress);
     if (report.receiver_rays > 0) {
       report.met = true;
       tell(tuner.measure_rays());
     }
     report.ray_cpu_seconds += cpu_seconds() - before_rays;
   }
-  traced.assign(tuner.traced().begin(), tuner.traced().end());
+  traced = tuner.rays().traced;
   return report;
 }
 
@@ -380,18 +399,16 @@ std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& o
                              std::span<const Pilot> pilots, unsigned rays, const Executor& executor,
                              Progress& progress) {
   Tuner tuner(scene, options, pilots, executor);
-  {
-    RayShader discs(scene, ray_options(options), executor);
-    tuner.trace(discs, static_cast<unsigned>(std::sqrt(static_cast<double>(rays))), progress);
-  }
+  tuner.trace([&](RayShader& discs) { return trace_evenly(pilots, rays, discs, progress); });
   tuner.begin_shading();
   std::vector<RungError> rungs;
   for (std::size_t rung = 0; rung < ladder().size(); ++rung) {
     const std::uint64_t shaded = tuner.shaded();
     const double before = cpu_seconds();
-    const CheckError error = tuner.measure(rung, true).error;
+    tuner.shade_whole_blocks(rung);
     const auto count = static_cast<double>(std::max<std::uint64_t>(1, tuner.shaded() - shaded));
-    rungs.push_back({error, (cpu_seconds() - before) * 1e6 / count});
+    const double seconds = cpu_seconds() - before;
+    rungs.push_back({tuner.measure(rung, true).error, seconds * 1e6 / count});
   }
   return rungs;
 }

@@ -40,6 +40,12 @@ struct Rung {
 /// Returns all settings to choose from, from coarse and cheap to fine and slow.
 [[nodiscard]] std::span<const Rung> ladder();
 
+/// Returns what the gather costs at a setting, as counts tell it, microseconds of CPU a receiver:
+/// fitted, and off by a quarter.
+[[nodiscard]] double gather_cost(const Rung& rung, const GatherWork& work);
+/// Returns what so many rays of a receiver cost, as gather_cost() does.
+[[nodiscard]] double ray_cost(unsigned rays);
+
 /// The result of a search for settings that meet an error (spec/shading.md#error).
 struct TuningReport {
   double asked = 0;      ///< error that was asked for, as CheckError::relative()
@@ -56,10 +62,10 @@ struct TuningReport {
   /// Bounds of `measured` as CheckError::relative(), at a confidence of 90 %: one in 20 resamples
   /// of those pilots has a lower error than `low`, and one in 20 a higher one than `high`.
   double low = 0, high = 0;
-  std::size_t pilots = 0;      ///< number of receivers compared with rays
-  unsigned rays = 0;           ///< rays for each of these receivers that results are compared with
-  std::uint64_t shaded = 0;    ///< receivers that were shaded, over all settings that were tried
-  double ray_cpu_seconds = 0;  ///< CPU time of the rays, all threads
+  std::size_t pilots = 0;        ///< number of receivers compared with rays
+  unsigned rays = 0;             ///< rays of each of these receivers, in the mean
+  std::uint64_t shaded = 0;      ///< receivers that were shaded, over all settings that were tried
+  double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads
   double shade_cpu_seconds = 0;  ///< CPU time of the gathers, all threads
 };
 
@@ -73,12 +79,13 @@ inline constexpr std::uint64_t kRunSeed = std::uint64_t{1} << 40;
 ///                  about count. Its cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
 /// @param by_rays   whether rays may shade the receivers
+/// @param pilots    get other receivers that are compared, as many in all
 /// @param compared  gets the receivers of the pilots that were compared
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
 ///                  pilot
 /// @throws FormatError when a page is damaged; std::system_error
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
-                                double asked, bool by_rays, std::span<const Pilot> pilots,
+                                double asked, bool by_rays, std::span<Pilot> pilots,
                                 const Executor& executor, Progress& progress,
                                 ReceiverPlaces& compared, std::vector<Shading>& traced);
 

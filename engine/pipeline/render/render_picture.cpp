@@ -145,8 +145,9 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
     subject.camera = camera;
     see(subject, request, part.tile, view, lighting, silent);
   };
-  lighting.tune([&] { return pilots_of_frames(subject, cameras, look, lighting.executor()); },
-                sparse);
+  const Frame& frame = lighting.scene().header().frame;
+  lighting.tune(
+      [&] { return pilots_of_frames(subject, cameras, look, frame, lighting.executor()); }, sparse);
 
   // Render all samples
   {

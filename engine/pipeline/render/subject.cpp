@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -100,48 +101,105 @@ bool is_sparse(const Subject& subject, float lift, const Lighting& lighting) {
                       lighting.executor()) > kShare;
 }
 
-/// Returns windows of receivers that stand for all receivers of a picture. Windows in which the
-/// camera meets nothing are left out.
-std::vector<Pilot> pilots_of(const Subject& subject, const Executor& executor) {
-  // Choose the size of a window; multiples of the shares kGolden cover the plane evenly (Roberts
-  // 2018)
-  constexpr double kGolden[2] = {0.7548776662466927, 0.5698402909980532};
-  constexpr unsigned kMaxSide = 32;
-  const ImageWindow& window = subject.window;
-  const unsigned side = subject.side;
-  const PilotPlan plan = plan_pilots(subject.samples());
-  const unsigned width = std::min(kMaxSide, window.width),
-                 height = std::min(kMaxSide, window.height);
-
-  // Find what the windows see, in twice as many as are wanted: some may see nothing
-  std::vector<Pilot> pilots(2 * plan.count);
-  for (std::size_t i = 0; i < pilots.size(); ++i) {
-    const auto place = [&](int axis, unsigned room) {
-      const double turn = kGolden[axis] * static_cast<double>(i + 1);
-      return static_cast<unsigned>((turn - std::floor(turn)) * (room + 1.0));
-    };
-    const unsigned x0 = window.x + place(0, window.width - width),
-                   y0 = window.y + place(1, window.height - height);
-    pilots[i].variant = static_cast<unsigned>(i / 2) % (side * side);
-    subject.view->look_at(samples_of({x0, y0, width, height}, side), false);
-    std::vector<std::optional<PrimaryHit>> hits(std::size_t{width} * height);
-    executor.for_each(height, [&](std::size_t row, unsigned) {
-      for (unsigned column = 0; column < width; ++column) {
-        // Begin each row elsewhere, so that those that are compared lie all over the window
-        const auto y = y0 + static_cast<unsigned>(row);
-        const unsigned x = x0 + (column + width / 2 + 5 * (y - y0)) % width;
-        const auto [sx, sy] = sample_at(x, y, pilots[i].variant, side);
-        hits[row * width + column] = subject.view->at(sx, sy);
-      }
-    });
-    for (const auto& hit : hits) {
-      if (hit) pilots[i].receivers.push_back(receiver_at(*hit));
+/// Returns what a sample of each pixel of a tile sees, along the Z-curve of its variant.
+/// @param sample  its number in a pixel
+std::vector<Receiver> receivers_of(const Subject& subject, const Tile& tile, unsigned sample,
+                                   const Frame& frame, const Executor& executor) {
+  std::vector<std::optional<PrimaryHit>> hits(tile.pixels());
+  executor.for_each(tile.height, [&](std::size_t row, unsigned) {
+    for (unsigned column = 0; column < tile.width; ++column) {
+      const auto [x, y] =
+          sample_at(tile.x0 + column, tile.y0 + static_cast<unsigned>(row), sample, subject.side);
+      hits[row * tile.width + column] = subject.view->at(x, y);
     }
+  });
+  std::vector<Receiver> found, sorted;
+  for (const auto& hit : hits) {
+    if (hit) found.push_back(receiver_at(*hit));
+  }
+  const unsigned variant = sample % TileRenderer::kMaxVariants;
+  for (const std::size_t i : order_along_curve(frame, found, variant, executor))
+    sorted.push_back(found[i]);
+  return sorted;
+}
+
+/// The tiles of a window, as they are rendered.
+class Tiles {
+ public:
+  Tiles(const ImageWindow& window, unsigned side)
+      : window_(window),
+        whole_(TileRenderer::tile_of(window.width, side)),
+        columns_((window.width + whole_.width - 1) / whole_.width),
+        count_(std::size_t{columns_} * ((window.height + whole_.height - 1) / whole_.height)),
+        step_(step_of(count_)) {}
+
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+  /// Returns the most receivers of a sample in a tile.
+  [[nodiscard]] std::size_t pixels() const { return whole_.pixels(); }
+  /// Returns a tile by its place in an order in which the first ones lie all over the window.
+  [[nodiscard]] Tile operator[](std::size_t index) const {
+    const auto number = static_cast<unsigned>(index * step_ % count_);
+    const unsigned x = number % columns_ * whole_.width, y = number / columns_ * whole_.height;
+    return {window_.x + x, window_.y + y, std::min(whole_.width, window_.width - x),
+            std::min(whole_.height, window_.height - y)};
   }
 
-  // Keep the first ones that see something
-  std::erase_if(pilots, [](const Pilot& pilot) { return pilot.receivers.empty(); });
-  pilots.resize(std::min(pilots.size(), plan.count));
+ private:
+  /// Returns the number next to the golden section of a count that has no divisor with it.
+  static std::size_t step_of(std::size_t count) {
+    auto step = static_cast<std::size_t>(static_cast<double>(count) / std::numbers::phi) + 1;
+    while (std::gcd(step, count) != 1) ++step;
+    return step;
+  }
+
+  ImageWindow window_;
+  Tile whole_;
+  unsigned columns_;
+  std::size_t count_, step_;
+};
+
+/// Adds pilots of a tile: some of the blocks of some of the samples.
+/// @param wanted  number of blocks
+/// @return        how many blocks were found
+std::size_t add_pilots_of(const Subject& subject, const Tile& tile, std::size_t index,
+                          std::size_t wanted, std::size_t stretches, const Frame& frame,
+                          const Executor& executor, std::vector<Pilot>& pilots) {
+  subject.view->look_at(samples_of(tile, subject.side), false);
+  const std::size_t samples = std::size_t{subject.side} * subject.side;
+  const std::size_t chosen = std::min(samples, wanted), of_each = (wanted + chosen - 1) / chosen;
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < chosen; ++k) {
+    const auto sample = static_cast<unsigned>((index + k * samples / chosen) % samples);
+    const std::vector<Receiver> all = receivers_of(subject, tile, sample, frame, executor);
+    const std::size_t blocks = (all.size() + Shader::kBlock - 1) / Shader::kBlock,
+                      taken = std::min(blocks, of_each);
+    for (std::size_t j = 0; j < taken; ++j) {
+      const std::size_t first = (2 * j + 1) * blocks / (2 * taken) * Shader::kBlock;
+      const auto some = std::span(all).subspan(first, std::min(Shader::kBlock, all.size() - first));
+      const double share =
+          static_cast<double>(blocks * samples) / static_cast<double>(taken * chosen);
+      add_pilots(pilots, {some.begin(), some.end()}, sample % TileRenderer::kMaxVariants, stretches,
+                 share);
+    }
+    found += taken;
+  }
+  return found;
+}
+
+/// Returns pilots that stand for all receivers of a picture.
+/// @param part  of so many pictures this is one, which have pilots in equal parts
+std::vector<Pilot> pilots_of(const Subject& subject, std::size_t part, const Frame& frame,
+                             const Executor& executor) {
+  constexpr std::size_t kTiles = 32;  // that blocks come from, where there are as many
+  const Tiles tiles(subject.window, subject.side);
+  const PilotPlan plan = plan_pilots(subject.samples(), std::min(Shader::kBlock, tiles.pixels()));
+  const std::size_t blocks = (plan.blocks + part - 1) / part;
+  const std::size_t of_tile =
+      (blocks + std::min(kTiles, tiles.count()) - 1) / std::min(kTiles, tiles.count());
+  std::vector<Pilot> pilots;
+  for (std::size_t i = 0, found = 0; i < tiles.count() && found < blocks; ++i) {
+    found += add_pilots_of(subject, tiles[i], i, of_tile, plan.stretches, frame, executor, pilots);
+  }
   return pilots;
 }
 
@@ -245,14 +303,13 @@ bool are_sparse(Subject& subject, const std::vector<Camera>& cameras, float lift
 
 std::vector<Pilot> pilots_of_frames(const Subject& subject, const std::vector<Camera>& cameras,
                                     const std::function<void(const Camera&)>& look,
-                                    const Executor& executor) {
+                                    const Frame& frame, const Executor& executor) {
   const std::size_t frames = std::min(kPilotFrames, cameras.size());
   std::vector<Pilot> pilots;
   for (std::size_t k = 0; k < frames; ++k) {
     if (frames > 1) look(pilot_camera(cameras, k));
-    std::vector<Pilot> of_frame = pilots_of(subject, executor);
-    for (std::size_t i = k; i < of_frame.size(); i += frames)
-      pilots.push_back(std::move(of_frame[i]));
+    const std::vector<Pilot> some = pilots_of(subject, frames, frame, executor);
+    pilots.insert(pilots.end(), some.begin(), some.end());
   }
   if (frames > 1) look(cameras.front());
   return pilots;

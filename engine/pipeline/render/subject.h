@@ -89,12 +89,12 @@ void see(Subject& subject, const RenderRequest& request, const TextureTile& tile
 [[nodiscard]] bool are_sparse(Subject& subject, const std::vector<Camera>& cameras, float lift,
                               const Lighting& lighting);
 
-/// Returns windows of receivers that stand for those of all frames: of a few frames, in equal
-/// parts.
-/// @param look  makes a view of the subject from a camera
+/// Returns pilots that stand for the receivers of all frames: of a few frames, in equal parts.
+/// @param look   makes a view of the subject from a camera
+/// @param frame  of the scene
 [[nodiscard]] std::vector<Pilot> pilots_of_frames(const Subject& subject,
                                                   const std::vector<Camera>& cameras,
                                                   const std::function<void(const Camera&)>& look,
-                                                  const Executor& executor);
+                                                  const Frame& frame, const Executor& executor);
 
 }  // namespace ptc

@@ -265,21 +265,24 @@ class Lifting {
   RisePlace rise_;
 };
 
-/// Returns runs of receivers that stand for all receivers, each from the middle of its stride.
+/// Returns pilots that stand for all receivers: some of the blocks that are shaded.
 std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
   const ContainerReader& container = receivers.container;
-  const PilotPlan plan = plan_pilots(receivers.points);
+  const PilotPlan plan = plan_pilots(receivers.points, Shader::kBlock);
+  const std::uint64_t blocks = (receivers.points + Shader::kBlock - 1) / Shader::kBlock;
   const std::vector<std::uint8_t> groups = rise_groups(container.meta().channels);
-  std::vector<Pilot> pilots(plan.count);
-  std::vector<Surfel> surfels(plan.receivers);
+  std::vector<Pilot> pilots;
+  std::vector<Surfel> surfels(std::min<std::uint64_t>(Shader::kBlock, receivers.points));
   std::vector<std::byte> rows;
-  for (std::size_t i = 0; i < pilots.size(); ++i) {
-    PointCursor cursor(container, groups, receivers.points,
-                       i * plan.stride + (plan.stride - plan.receivers) / 2);
-    const std::size_t count = cursor.next(surfels, &rows);
-    pilots[i].receivers.resize(count);
+  for (std::size_t i = 0; i < plan.blocks; ++i) {
+    // The middle one of each share of all blocks
+    const std::uint64_t number = (2 * i + 1) * blocks / (2 * plan.blocks);
+    PointCursor cursor(container, groups, receivers.points, number * Shader::kBlock);
+    std::vector<Receiver> block(cursor.next(surfels, &rows));
+    if (block.empty()) continue;
     Lifting(container.header().frame, cursor.channels(), lift)
-        .place(std::span(surfels).first(count), rows, pilots[i].receivers);
+        .place(std::span(surfels).first(block.size()), rows, block);
+    add_pilots(pilots, std::move(block), 0, plan.stretches, 1);
   }
   return pilots;
 }

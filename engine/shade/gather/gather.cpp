@@ -58,12 +58,13 @@ Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& opt
 }
 
 void Gather::shade(std::span<const Receiver> receivers, std::span<Shading> results,
-                   const DirectionGrid& grid) {
+                   const DirectionGrid& grid, std::span<const float> weights) {
   if (receivers.empty()) return;
   grid_ = &grid;
   given_ = receivers;
   if (openings_) openings_->forget();
   place(receivers);
+  sum_weights(weights);
   results_ = results;
   payloads_.clear();
   stack_.assign(1, scene_.view().root());
@@ -88,15 +89,48 @@ void Gather::place(std::span<const Receiver> from) {
   });
 }
 
+void Gather::sum_weights(std::span<const float> weights) {
+  weight_before_.clear();
+  if (weights.empty()) return;
+  double sum = 0;
+  for (const PlacedReceiver& receiver : receivers_) {
+    weight_before_.push_back(sum);
+    sum += static_cast<double>(weights[receiver.index]);
+  }
+  weight_before_.push_back(sum);
+  work_.receivers += sum;
+}
+
+// The weight of the receivers of a cell; their number, where all have results.
+double Gather::weight_of(std::span<const PlacedReceiver> cell) const {
+  if (weight_before_.empty()) return static_cast<double>(cell.size());
+  const auto first = static_cast<std::size_t>(cell.data() - receivers_.data());
+  return weight_before_[first + cell.size()] - weight_before_[first];
+}
+
+// Adds what a cell took, shared among its receivers.
+void Gather::add_work(std::span<const PlacedReceiver> cell, const GatherCounts& before) {
+  if (weight_before_.empty()) return;
+  const double share = weight_of(cell) / static_cast<double>(cell.size());
+  const auto of = [&](std::uint64_t GatherCounts::*count) {
+    return share * static_cast<double>(counts_.*count - before.*count);
+  };
+  work_.surfel_blocks += of(&GatherCounts::surfel_blocks);
+  work_.clusters += of(&GatherCounts::clusters);
+}
+
 // Shades the receivers of one cell, with what is on the stack and what the cell around it left.
 // `inherited` is what the cells around this one have drawn; `bound`, what the stand-ins for lost
 // nodes in it may change at most.
 void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
                         std::size_t depth, float bound) {
+  if (weight_of(cell) == 0) return;
   ReceiverCell bounds(cell);
   if (options_.around.sphere) bounds.has_horizon = false;
+  const GatherCounts counted = counts_;
   if (cell.size() == 1) {
     const DirectionBuffer& drawn = collect(bounds, inherited, leaf_, nullptr, depth, bound);
+    add_work(cell, counted);
     resolve(cell, drawn, depth, bound);
     return;
   }
@@ -113,6 +147,7 @@ void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuf
   const std::size_t before = payloads_.size();
   const DirectionBuffer& drawn =
       collect(bounds, inherited, level.buffer, &level.left, depth, bound);
+  add_work(cell, counted);
   if (level.left.empty()) {
     resolve(cell, drawn, depth + 1, bound);
   } else {
@@ -128,7 +163,12 @@ void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuf
 void Gather::resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn,
                      std::size_t depth, float bound) {
   std::array<glm::vec3, kViewpoints> offsets{};
-  for (const PlacedReceiver& receiver : cell) {
+  std::size_t wanted = 0;
+  for (std::size_t k = 0; k < cell.size(); ++k) {
+    const double weight = weight_of(cell.subspan(k, 1));
+    if (weight == 0) continue;
+    ++wanted;
+    const PlacedReceiver& receiver = cell[k];
     for (std::size_t i = 0; i < depth; ++i) {
       offsets[i] = glm::vec3((receiver.position - levels_[i]->centre) * SceneScale::kLatticeUnit);
     }
@@ -136,11 +176,13 @@ void Gather::resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer
     result = drawn.resolve(*grid_, receiver.normal, std::span(offsets).first(depth),
                            weights_ ? &*weights_ : nullptr);
     // Rays would pass through what stand-ins cover
-    if (openings_ && grid_->has_sky() && bound == 0)
-      counts_.rays += openings_->mend(*grid_, drawn, given_[receiver.index], result);
+    if (!openings_ || !grid_->has_sky() || bound > 0) continue;
+    const std::uint64_t rays = openings_->mend(*grid_, drawn, given_[receiver.index], result);
+    counts_.rays += rays;
+    if (!weight_before_.empty()) work_.rays += weight * static_cast<double>(rays);
   }
-  counts_.receivers += cell.size();
-  if (bound > 0) counts_.damage.add(cell.size(), std::min(1.0F, bound));
+  counts_.receivers += wanted;
+  if (bound > 0) counts_.damage.add(wanted, std::min(1.0F, bound));
 }
 
 // Tests what is on the stack and what the cell around left. Draws what looks the same to all

@@ -43,10 +43,17 @@ class Gather {
   /// @param results    as many as receivers, in the same order
   /// @param grid       of the options' resolution; its variant also shifts the receiver cells
   /// @throws FormatError for a damaged page, unless the view notes lost pages; std::system_error
+  /// @param weights    as many as receivers, or none. Receivers of weight 0 have their part in the
+  ///                   cells, but no results: the others get what a call for all would give them,
+  ///                   for less. (Where the sky is found through small openings, the receiver
+  ///                   before has a part in it, which is then another one.)
   void shade(std::span<const Receiver> receivers, std::span<Shading> results,
-             const DirectionGrid& grid);
+             const DirectionGrid& grid, std::span<const float> weights = {});
   /// The counts of all calls so far.
   [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
+  /// What the receivers of all calls with weights take of the work, each its share of what it has
+  /// in common with the whole call, whether that was shaded or not.
+  [[nodiscard]] const GatherWork& work() const noexcept { return work_; }
 
  private:
   /// One depth of receiver cells: what the current cell of that depth draws and leaves.
@@ -59,6 +66,9 @@ class Gather {
   };
 
   void place(std::span<const Receiver> from);
+  void sum_weights(std::span<const float> weights);
+  [[nodiscard]] double weight_of(std::span<const PlacedReceiver> cell) const;
+  void add_work(std::span<const PlacedReceiver> cell, const GatherCounts& before);
   void shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuffer& inherited,
                   std::size_t depth, float bound);
   void resolve(std::span<const PlacedReceiver> cell, const DirectionBuffer& drawn,
@@ -80,7 +90,9 @@ class Gather {
   std::optional<PixelWeights> weights_;  ///< of GatherOptions::around, unless that is plain
   const DirectionGrid* grid_ = nullptr;  ///< of the current call
   GatherCounts counts_;
-  std::vector<PlacedReceiver> receivers_;       ///< of the current call, along the Z-curve
+  std::vector<PlacedReceiver> receivers_;  ///< of the current call, along the Z-curve
+  std::vector<double> weight_before_;      ///< of each receiver, and of all at the end; or empty
+  GatherWork work_;
   std::span<const Receiver> given_;             ///< of the current call, in the caller's order
   std::span<Shading> results_;                  ///< of the current call
   std::vector<std::unique_ptr<Level>> levels_;  ///< by depth, made when first needed

@@ -5,6 +5,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/run.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/reference/brute_force.h"
 #include "format/point_page.h"
@@ -44,16 +45,17 @@ std::vector<Pilot> blocks_of(const ContainerReader& container, unsigned wanted, 
   const std::size_t pages_of_block = (Shader::kBlock + per_page - 1) / per_page;
   const std::size_t count =
       std::min<std::size_t>(wanted, std::max<std::size_t>(1, pages.size() / pages_of_block));
-  std::vector<Pilot> blocks(pages.empty() ? 0 : count);
-  for (std::size_t i = 0; i < blocks.size(); ++i) {
+  std::vector<Pilot> blocks;
+  for (std::size_t i = 0; i < (pages.empty() ? 0 : count); ++i) {
     const std::size_t first = (pages.size() - std::min(pages.size(), pages_of_block)) * i /
                               std::max<std::size_t>(1, count - 1);
     std::vector<Surfel> surfels;
     append_surfels(container, pages.subrange(first, std::min(pages_of_block, pages.size() - first)),
                    surfels);
     surfels.resize(std::min(surfels.size(), Shader::kBlock));
-    for (const Surfel& s : surfels)
-      blocks[i].receivers.push_back(lifted(s, lift, container.header().frame));
+    std::vector<Receiver> block;
+    for (const Surfel& s : surfels) block.push_back(lifted(s, lift, container.header().frame));
+    add_pilots(blocks, std::move(block), 0, 1, 1);
   }
   return blocks;
 }
@@ -100,9 +102,10 @@ SceneErrors measure_errors(const SceneChoice& choice, const ErrorOptions& option
   const ContainerReader container(scene.path());
   const ThreadPool executor(run.threads);
   errors.surfels = container.superblock().points;
-  const ShadeOptions settings{
-      .cache_bytes = cache_bytes_left(budget_of(run.memory_bytes, "the ladder"), container,
-                                      executor.threads(), executor.threads(), BackEnd::pread)};
+  ShadeOptions settings{.cache_bytes = cache_bytes_left(budget_of(run.memory_bytes, "the ladder"),
+                                                        container, executor.threads(),
+                                                        executor.threads(), BackEnd::pread)};
+  settings.gather.emission = !lit_by_emitters(container);
   const std::vector<Pilot> blocks = blocks_of(container, options.climbed, options.scene.lift);
   progress.begin(choice.name + ", the ladder", 0, "receivers");
   errors.rungs = climb(container, settings, blocks, options.rays / 2, executor, progress);

@@ -1,0 +1,40 @@
+// Results by rays at the compared receivers of pilots: what settings are judged by.
+//
+//   few rays at all of them    |   |  |   |   |  |   |      tell the noise of each
+//   as many as it takes        |   || |   ||| |  |   |||    more where there is more noise
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/pipeline/quality/pilots.h"
+#include "engine/trace/ray_shader.h"
+
+namespace ptc {
+
+/// Two independent results by rays for each compared receiver of some pilots, side by side, pilot
+/// by pilot.
+struct PilotRays {
+  std::vector<Receiver> compared;
+  std::vector<Shading> traced;  ///< twice as many
+  double rays = 0;              ///< of a result, in the mean
+  /// How many rays of a receiver have a noise of 1 as CheckError::relative_noise(), as the noise of
+  /// n rays falls as n^-0.6.
+  double rays_of_noise_1 = 0;
+
+  /// Returns how many rays have a noise, about.
+  [[nodiscard]] double rays_for(double noise) const;
+};
+
+/// Traces as many rays at all receivers.
+/// @param rays  for each of the two results of a receiver
+[[nodiscard]] PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& discs,
+                                     Progress& progress);
+
+/// Traces so many rays that the noise of a result is about `asked` in the mean of all receivers:
+/// that is enough, since it is averaged out over some hundred. Where all have equal rays, those
+/// that see small bright things have most of the noise: so they get more, and all others fewer.
+[[nodiscard]] PilotRays trace_for(std::span<const Pilot> pilots, double asked, RayShader& discs,
+                                  Progress& progress);
+
+}  // namespace ptc
