@@ -48,6 +48,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_glossy_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
 [[nodiscard]] Experiment make_instructions_experiment();
+[[nodiscard]] Experiment make_knob_experiment();
 [[nodiscard]] Experiment make_model_experiment();
 [[nodiscard]] Experiment make_mutations_experiment();
 [[nodiscard]] Experiment make_relight_experiment();
