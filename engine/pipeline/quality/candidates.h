@@ -1,10 +1,10 @@
 // Chooses which receivers of pilots are compared with rays, so that few that are off by far more
 // than all others are found.
 //
-//   candidates            . . . . . . . . . . . . . . . .    64 of each pilot, shaded at two
-//   settings signs of an error     . . _ . . | . . . . . . . _ . .    how far these differ, how
-//   much light chance                        high compared              '   '     '     '       '
-//   '      weight: 1 / chance
+//   candidates          . . . . . . . . . . . . . . .    64 of each pilot, at two settings
+//   signs of an error   . . _ . . | . . . . . . _ . .    how far these differ, how much light
+//   compared                '   ' '       '     '        often where signs are high
+//   weight                                               1 / chance
 #pragma once
 
 #include <span>

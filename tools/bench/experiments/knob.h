@@ -2,8 +2,7 @@
 //
 //   receivers of a set ---> pilots of seed 1 -> tune() -> setting -+
 //           |         `---> pilots of seed 2 -> tune() -> setting -+-> its error at many others
-//           `-------------> many other receivers ------------------'   is compared with what was
-//           asked
+//           `-------------> many other receivers ------------------'   against what was asked
 #pragma once
 
 #include <filesystem>
