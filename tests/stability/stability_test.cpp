@@ -50,6 +50,14 @@ TEST_CASE("stability: what moves does not jump", "[stability]") {
   check_rows(rows_of_motion());
 }
 
+TEST_CASE("stability: pictures of a camera or an object that moves do not flicker", "[stability]") {
+  check_rows(rows_of_pictures());
+}
+
+TEST_CASE("stability: pictures show no seams with eight times the contrast", "[stability]") {
+  check_rows(rows_of_seams());
+}
+
 TEST_CASE("stability: inputs that are odd, huge or turned", "[stability]") {
   check_rows(rows_of_inputs());
 }

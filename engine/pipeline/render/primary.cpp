@@ -7,6 +7,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "engine/pipeline/render/clearance.h"
 #include "engine/pipeline/render/overview.h"
 #include "engine/pipeline/scene_record.h"
 
@@ -38,6 +39,8 @@ class MeshView : public PrimaryView {
     if (!hit) return std::nullopt;
     PrimaryHit seen =
         seen_of_mesh(scene_, light_, sampling_, *hit, direction, lift_, std::uint64_t{y} << 32 | x);
+    seen.position =
+        clear_of_walls(scene_, hit->position, seen.offset_normal, direction, double{lift_});
     seen.depth = static_cast<float>(hit->distance * glm::dot(glm::dvec3(direction), forward_));
     return seen;
   }
@@ -58,9 +61,8 @@ PrimaryHit seen_of_mesh(const RayScene& scene, const DirectLight& light,
                         const LightSampling& sampling, const SurfaceHit& at,
                         const glm::vec3& towards, float lift, std::uint64_t seed) {
   const float turn = at.front ? 1.0F : -1.0F;
-  // Step back towards the camera, away from every surface that meets at the place: a receiver in
-  // an edge would else lie behind the discs of the other side, which are clear to it, or look
-  // through the gap that they leave along the edge
+  // Step back the way that the place is looked at along, for views that do not look for walls: a
+  // receiver in an edge would else lie behind the discs of the other side, which are clear to it
   const glm::dvec3 place = at.position - glm::dvec3(towards) * double{kStepBack * lift};
   const glm::dvec3 geometric(at.geometric_normal * turn);
   PrimaryHit primary{.position = place,

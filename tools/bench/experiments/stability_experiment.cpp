@@ -21,7 +21,11 @@ constexpr char kReading[] =
     "rays at the discs or at the mesh. 0 would be right everywhere. What is shown is light over pi "
     "(1 where white surrounds a receiver) or the share of the hemisphere that is open. Numbers of "
     "rows count the failures that spec/shading.md#stability lists. FLIP is the visible difference, "
-    "from 0 to 1, mean over the small picture. Bounds are those of the tests.";
+    "from 0 to 1, mean over the small picture. Of pictures that follow one another a slice is "
+    "shown, the row of pixels with the largest step of each frame below that of the frame before; "
+    "steps are those of a pixel from frame to frame in any channel, where 0.5 % of white beyond "
+    "1.5 of the true step is the aim. Temporal FLIP is FLIP (Andersson et al. 2020) between both "
+    "changes, ours and the true one, half as large around grey. Bounds are those of the tests.";
 
 /// A line of the table: a figure of a row.
 struct Line {

@@ -12,8 +12,8 @@ void Field::add(std::span<const Shading> shadings, glm::vec3 (*value)(const Shad
 
 std::vector<Row> all_rows() {
   std::vector<Row> rows;
-  for (const auto& some :
-       {rows_of_contacts(), rows_of_pixels(), rows_of_walls(), rows_of_motion(), rows_of_inputs()})
+  for (const auto& some : {rows_of_contacts(), rows_of_pixels(), rows_of_walls(), rows_of_motion(),
+                           rows_of_pictures(), rows_of_seams(), rows_of_inputs()})
     rows.insert(rows.end(), some.begin(), some.end());
   std::ranges::stable_sort(rows, {}, [](const Row& row) { return std::atoi(row.number); });
   return rows;

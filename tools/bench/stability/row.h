@@ -60,6 +60,10 @@ struct Row {
 [[nodiscard]] std::span<const Row> rows_of_walls();
 /// Rows in which something moves.
 [[nodiscard]] std::span<const Row> rows_of_motion();
+/// Rows of pictures whose camera or objects move.
+[[nodiscard]] std::span<const Row> rows_of_pictures();
+/// Rows of seams in pictures.
+[[nodiscard]] std::span<const Row> rows_of_seams();
 /// Rows of inputs that are odd, huge or turned.
 [[nodiscard]] std::span<const Row> rows_of_inputs();
 
