@@ -87,6 +87,7 @@ measure formats formats -- --points 20k "${once[@]}"
 measure glossy glossy city "$mesh" -- city --points 4k --checked 20 "${once[@]}"
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
+measure hunt hunt -- --scenes 20
 measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"

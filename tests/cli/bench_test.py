@@ -193,6 +193,22 @@ class Bench(ProgramTest):
         self.assertLess(rows[2]["radiance"], 0.3)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["glossy.csv", "glossy.json", "glossy.png", "glossy.svg"])
 
+    def test_scenes_that_are_drawn_by_chance_are_judged_and_shrunk(self):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "hunt", "--quick", "--scenes", "4", "-o", charts)
+        facts = json.loads((charts / "hunt.json").read_text())
+        self.assertEqual(len(facts["rows"]), 3)
+        for row in facts["rows"]:
+            self.assertLessEqual(row["median"], row["worst"])
+            self.assertLess(row["worst"], 0.2)
+        self.assertEqual(len(facts["worst"]), 3)
+        for row in facts["worst"]:
+            self.assertIn("receiver ", row["text"])
+        self.assertGreater(len(facts["kept"]), 5)
+        self.assertEqual({row["holds"] for row in facts["kept"]}, {"yes"})
+        self.assertEqual(sorted(p.name for p in charts.iterdir()),
+                         ["hunt-kept.csv", "hunt-worst.csv", "hunt.csv", "hunt.json", "hunt.png", "hunt.svg"])
+
     def test_pictures_of_rooms_are_compared_with_paths(self):
         charts, pictures = self.here / "charts", self.here / "pictures"
         self.succeed("ptcbench", "rooms", "cornell", "box-lamp", "--quick", "--pictures", pictures, "-o", charts)

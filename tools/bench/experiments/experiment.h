@@ -47,6 +47,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_formats_experiment();
 [[nodiscard]] Experiment make_glossy_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
+[[nodiscard]] Experiment make_hunt_experiment();
 [[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_model_experiment();
 [[nodiscard]] Experiment make_mutations_experiment();
