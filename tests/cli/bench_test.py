@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import subprocess
+import sys
 import unittest
 
 from programs import ProgramTest, ball, write_ply
@@ -221,6 +223,34 @@ class Bench(ProgramTest):
         self.assertEqual(sorted(p.name for p in charts.iterdir()),
                          ["rooms-box-lamp.png", "rooms-cornell.png", "rooms.csv", "rooms.json"])
         self.assertEqual(sorted(p.name for p in pictures.iterdir()), ["box-lamp.exr", "cornell.exr"])
+
+    def check_truth(self, judge, *arguments):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "truth", "cornell", "--quick", *arguments, "-o", charts)
+        rows = json.loads((charts / "truth.json").read_text())["rows"]
+        self.assertEqual([(r["scene"], r["bounces"]) for r in rows], [("cornell", 1), ("cornell", 2)])
+        for row in rows:
+            self.assertRegex(row["judge"], judge)
+            self.assertLess(abs(row["bias"]), 0.03)
+            self.assertLess(row["rms"], 0.08)
+            self.assertGreater(row["judged"], 0.5)
+            self.assertGreater(row["noise"], 0)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["truth-cornell.png", "truth.csv", "truth.json"])
+
+    def test_pictures_of_bounces_are_compared_with_our_paths(self):
+        self.check_truth("^own paths$")
+
+    def test_pictures_of_bounces_are_compared_with_mitsuba(self):
+        python = os.environ.get("PTC_MITSUBA_PYTHON", sys.executable)
+        if subprocess.run([python, "-c", "import mitsuba"], capture_output=True).returncode:
+            self.skipTest("Mitsuba 3 is not installed: pip install mitsuba, and name the Python in PTC_MITSUBA_PYTHON")
+        self.check_truth("^Mitsuba 3", "--python", python)
+
+    def test_a_python_without_mitsuba_is_told(self):
+        (self.here / "charts").mkdir()
+        message = self.fail_with(1, "ptcbench", "truth", "cornell", "--quick", "--points", "2k", "--python", "false",
+                                 "-o", self.here / "charts")
+        self.assertIn("false cannot run Mitsuba", message)
 
     def test_files_are_joined_to_one_room(self):
         charts = self.here / "charts"

@@ -59,6 +59,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_sort_experiment();
 [[nodiscard]] Experiment make_specks_experiment();
 [[nodiscard]] Experiment make_stability_experiment();
+[[nodiscard]] Experiment make_truth_experiment();
 [[nodiscard]] Experiment make_verify_experiment();
 
 /// Runs an experiment that measures rows, and publishes a report whenever there are more rows.
