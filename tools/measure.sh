@@ -104,7 +104,7 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
   --points 20k --panel disk --order city "${once[@]}"
 measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
 measure stability stability -- --row 3 --row 12
-measure truth truth --python python3 -- --paths 32 --points 5k
+measure truth truth --points 100k --size 128x96 --paths 512 --python python3 -- --paths 32 --points 5k --size 32x24
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
 [[ -n $list || -n $known ]] || usage "there is no result '$only'. --list prints the names"

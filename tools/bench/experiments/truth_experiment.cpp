@@ -20,8 +20,9 @@ constexpr char kReading[] =
     "paths, which two independent halves give and which stands beside it. FLIP is the visible "
     "difference of whole pictures as they are shown here, from 0 to 1, and HDR-FLIP the greatest "
     "over all exposures; beside it that of one half of the paths against the other, which is noise "
-    "alone. In whole pictures edges count, through which the path tracer has other rays. Times are "
-    "wall times of one run on all cores.";
+    "alone. Mitsuba has other rays through a pixel, so edges in whole pictures and borders of "
+    "shadows in all figures differ by that alone; our own paths take the same rays. Times are wall "
+    "times of one run on all cores.";
 
 /// One line of the table.
 using R = TruthRow;
