@@ -87,6 +87,7 @@ measure formats formats -- --points 20k "${once[@]}"
 measure glossy glossy city "$mesh" -- city --points 4k --checked 20 "${once[@]}"
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
+measure hunt hunt -- --scenes 20
 measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
@@ -103,6 +104,7 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
   --points 20k --panel disk --order city "${once[@]}"
 measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
 measure stability stability -- --row 3 --row 12
+measure truth truth --points 100k --size 128x96 --paths 512 --python python3 -- --paths 32 --points 5k --size 32x24
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 
 [[ -n $list || -n $known ]] || usage "there is no result '$only'. --list prints the names"

@@ -24,8 +24,8 @@ constexpr SceneOptions kSmall{.points = 3000,
 
 }  // namespace
 
-TEST_CASE("scene: five words name scenes, everything else names a file", "[bench][scene]") {
-  for (const char* word : {"fractal", "window", "city", "cornell", "box-lamp"}) {
+TEST_CASE("scene: six words name scenes, everything else names a file", "[bench][scene]") {
+  for (const char* word : {"fractal", "window", "city", "cornell", "box-lamp", "ajar"}) {
     const SceneChoice choice = parse_scene(word);
     CHECK(choice.name == word);
     CHECK(choice.file.empty());
@@ -56,7 +56,7 @@ TEST_CASE("scene: the suffix +backdrop is cut off a file's name and refused afte
   CHECK(choice.name == "dragon");
   CHECK(choice.backdrop);
   CHECK(parse_scene("a+backdrop.obj").file == "a+backdrop.obj");
-  for (const char* word : {"fractal", "window", "city", "cornell", "box-lamp"}) {
+  for (const char* word : {"fractal", "window", "city", "cornell", "box-lamp", "ajar"}) {
     CHECK_THROWS_AS(parse_scene(std::string(word) + "+backdrop"), RequestError);
   }
 }

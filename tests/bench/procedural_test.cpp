@@ -114,6 +114,31 @@ TEST_CASE("window room: light leaves it through the window alone", "[bench][proc
   }
 }
 
+TEST_CASE("rooms with a door ajar: light reaches the camera's room through the gap alone",
+          "[bench][procedural]") {
+  const LitScene scene = make_ajar_rooms();
+  check_sound(scene.mesh);
+  const RayScene rays(scene.mesh);
+  // Nothing leaves the rooms, and what sees a lamp from the dark room sees it through the doorway
+  const SquarePoints points(9);
+  unsigned through = 0;
+  for (std::uint32_t i = 0; i < 20'000; ++i) {
+    const glm::vec2 p = points.square(i);
+    const float y = 2 * p.x - 1, ring = std::sqrt(1 - y * y),
+                turn = 2 * std::numbers::pi_v<float> * p.y;
+    const glm::vec3 along(ring * std::cos(turn), y, ring * std::sin(turn)), from(2.5F, 1.3F, 1.2F);
+    const auto hit = rays.closest(glm::dvec3(from), along, 0, kFar);
+    REQUIRE(hit);
+    REQUIRE(hit->front);
+    if (hit->position.x < 4.21) continue;
+    ++through;
+    const glm::vec2 at = at_plane(from, along, 4.1F);
+    REQUIRE((at.x > 0 && at.x < 2.1F && at.y > 1.4F && at.y < 2.3F));
+  }
+  CHECK(through > 100);
+  CHECK(scene.mesh.emits());
+}
+
 TEST_CASE("Cornell box: both lamps shine into a valid room, which has two sides with a box",
           "[bench][procedural]") {
   for (const CornellLamp lamp : {CornellLamp::flat, CornellLamp::box}) {

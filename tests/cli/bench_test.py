@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import subprocess
+import sys
 import unittest
 
 from programs import ProgramTest, ball, write_ply
@@ -193,6 +195,22 @@ class Bench(ProgramTest):
         self.assertLess(rows[2]["radiance"], 0.3)
         self.assertEqual(sorted(p.name for p in charts.iterdir()), ["glossy.csv", "glossy.json", "glossy.png", "glossy.svg"])
 
+    def test_scenes_that_are_drawn_by_chance_are_judged_and_shrunk(self):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "hunt", "--quick", "--scenes", "4", "-o", charts)
+        facts = json.loads((charts / "hunt.json").read_text())
+        self.assertEqual(len(facts["rows"]), 3)
+        for row in facts["rows"]:
+            self.assertLessEqual(row["median"], row["worst"])
+            self.assertLess(row["worst"], 0.2)
+        self.assertEqual(len(facts["worst"]), 3)
+        for row in facts["worst"]:
+            self.assertIn("receiver ", row["text"])
+        self.assertGreater(len(facts["kept"]), 5)
+        self.assertEqual({row["holds"] for row in facts["kept"]}, {"yes"})
+        self.assertEqual(sorted(p.name for p in charts.iterdir()),
+                         ["hunt-kept.csv", "hunt-worst.csv", "hunt.csv", "hunt.json", "hunt.png", "hunt.svg"])
+
     def test_pictures_of_rooms_are_compared_with_paths(self):
         charts, pictures = self.here / "charts", self.here / "pictures"
         self.succeed("ptcbench", "rooms", "cornell", "box-lamp", "--quick", "--pictures", pictures, "-o", charts)
@@ -205,6 +223,34 @@ class Bench(ProgramTest):
         self.assertEqual(sorted(p.name for p in charts.iterdir()),
                          ["rooms-box-lamp.png", "rooms-cornell.png", "rooms.csv", "rooms.json"])
         self.assertEqual(sorted(p.name for p in pictures.iterdir()), ["box-lamp.exr", "cornell.exr"])
+
+    def check_truth(self, judge, *arguments):
+        charts = self.here / "charts"
+        self.succeed("ptcbench", "truth", "cornell", "--quick", *arguments, "-o", charts)
+        rows = json.loads((charts / "truth.json").read_text())["rows"]
+        self.assertEqual([(r["scene"], r["bounces"]) for r in rows], [("cornell", 1), ("cornell", 2)])
+        for row in rows:
+            self.assertRegex(row["judge"], judge)
+            self.assertLess(abs(row["bias"]), 0.03)
+            self.assertLess(row["rms"], 0.08)
+            self.assertGreater(row["judged"], 0.5)
+            self.assertGreater(row["noise"], 0)
+        self.assertEqual(sorted(p.name for p in charts.iterdir()), ["truth-cornell.png", "truth.csv", "truth.json"])
+
+    def test_pictures_of_bounces_are_compared_with_our_paths(self):
+        self.check_truth("^own paths$")
+
+    def test_pictures_of_bounces_are_compared_with_mitsuba(self):
+        python = os.environ.get("PTC_MITSUBA_PYTHON", sys.executable)
+        if subprocess.run([python, "-c", "import mitsuba"], capture_output=True).returncode:
+            self.skipTest("Mitsuba 3 is not installed: pip install mitsuba, and name the Python in PTC_MITSUBA_PYTHON")
+        self.check_truth("^Mitsuba 3", "--python", python)
+
+    def test_a_python_without_mitsuba_is_told(self):
+        (self.here / "charts").mkdir()
+        message = self.fail_with(1, "ptcbench", "truth", "cornell", "--quick", "--points", "2k", "--python", "false",
+                                 "-o", self.here / "charts")
+        self.assertIn("false cannot run Mitsuba", message)
 
     def test_files_are_joined_to_one_room(self):
         charts = self.here / "charts"

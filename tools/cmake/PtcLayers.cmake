@@ -24,8 +24,9 @@ set(PTC_LAYERS_tools/bench/report "format;engine/base;engine/io/file;engine/io;t
 set(PTC_LAYERS_tools/bench/scenes "${PTC_LAYERS_engine/pipeline};engine/pipeline;engine")
 set(PTC_LAYERS_tools/bench/references "${PTC_LAYERS_tools/bench/scenes};tools/bench/chart;tools/bench/scenes")
 set(PTC_LAYERS_tools/bench/stability "${PTC_LAYERS_tools/bench/references};tools/bench/references;tools/bench/shapes")
+set(PTC_LAYERS_tools/bench/hunt "${PTC_LAYERS_tools/bench/stability};tools/bench/stability")
 set(PTC_LAYERS_tools/bench/experiments
-  "${PTC_LAYERS_tools};tools;tools/bench/report;tools/bench/scenes;tools/bench/references;tools/bench/shapes;tools/bench/stability")
+  "${PTC_LAYERS_tools};tools;tools/bench/report;tools/bench/scenes;tools/bench/references;tools/bench/shapes;tools/bench/stability;tools/bench/hunt")
 set(PTC_LAYERS_tools/bench "${PTC_LAYERS_tools/bench/experiments};tools/bench/experiments")
 
 add_library(ptc_options INTERFACE)

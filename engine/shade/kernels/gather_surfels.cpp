@@ -13,6 +13,11 @@
 // The back of a disc is clear to receivers within two radii of its middle. Where that holds for
 // some receivers of a cell and not for others, the disc is kept, however far it is.
 //
+// The two sides of a sheet are discs at nearly one place, and the depths that decide between them
+// are seen from the cell's centre where a cell draws, and from the receiver where that does. So a
+// front is drawn wherever the back behind it may be drawn: with what is a little farther away, and
+// both by the cell and by the receiver where the back's being clear is left to the receiver.
+//
 // Surfels come from a page in columns (spec/points.md#point-page), or from the lists that the
 // enclosing cell left. Coordinates of a page are 42-bit lattice numbers, more than a float holds,
 // so the centre is taken off in integers first.
@@ -32,6 +37,12 @@
 HWY_BEFORE_NAMESPACE();
 namespace ptc::HWY_NAMESPACE {
 namespace {
+
+/// Bound of how much farther away the other side of a sheet may be, in radii: twice 0.02, and some.
+/// It counts up to a tenth of the distance, so that what lies just below a receiver stays near.
+constexpr float kSheetDepth = 0.05F;
+/// Bound of how far the two sides of a sheet differ in distances of two radii, in radii.
+constexpr float kSheetSlack = 0.2F;
 
 /// Draws, keeps or drops surfels.
 /// @param wanted  surfels to look at
@@ -58,7 +69,9 @@ HWY_INLINE void settle(const CellTest& test, const PageSurfels& s, MF wanted, co
   const auto aside = hn::Sqrt(hn::Max(hn::NegMulAdd(height, height, d2), hn::Zero(f)));
   const auto beyond = hn::Max(hn::Sub(aside, s.radius), hn::Zero(f));
   const auto d = hn::Sqrt(hn::MulAdd(beyond, beyond, hn::Mul(height, height)));
-  auto drawn = hn::And(wanted, hn::Ge(d, hn::Set(f, test.shared_from)));
+  const auto other_side =
+      hn::Add(d, hn::Min(hn::Mul(hn::Set(f, kSheetDepth), s.radius), hn::Mul(hn::Set(f, 0.1F), d)));
+  auto drawn = hn::And(wanted, hn::Ge(other_side, hn::Set(f, test.shared_from)));
   // Keep what is near or in the seam.
   auto keep = hn::FirstN(f, 0);
   if (!test.last) {
@@ -67,12 +80,17 @@ HWY_INLINE void settle(const CellTest& test, const PageSurfels& s, MF wanted, co
     keep = hn::And(wanted, hn::Lt(d, seam_end(test, hn::Abs(height), above, d)));
     // Keep, and do not draw, what shows a clear back to some receivers of the cell alone.
     const auto reach = hn::Add(s.radius, s.radius), middle = hn::Sqrt(d2);
-    const auto clear_to_some =
-        hn::And(hn::Lt(hn::Sub(middle, rho), reach), hn::Gt(height, hn::Neg(rho)));
-    const auto clear_to_all = hn::And(hn::Lt(hn::Add(middle, rho), reach), hn::Gt(height, rho));
+    const auto nearest = hn::Sub(middle, rho), farthest = hn::Add(middle, rho);
+    const auto clear_to_some = hn::And(hn::Lt(nearest, reach), hn::Gt(height, hn::Neg(rho)));
+    const auto clear_to_all = hn::And(hn::Lt(farthest, reach), hn::Gt(height, rho));
     const auto divided = hn::AndNot(clear_to_all, clear_to_some);
     drawn = hn::AndNot(divided, drawn);
     keep = hn::Or(keep, hn::And(wanted, divided));
+    // Keep, and draw, fronts at about that distance: the backs behind them may be of one sheet.
+    const auto front = hn::And(wanted, hn::Lt(height, hn::Zero(f)));
+    const auto about = hn::AndNot(hn::Lt(farthest, hn::Mul(hn::Set(f, 2 - kSheetSlack), s.radius)),
+                                  hn::Lt(nearest, hn::Mul(hn::Set(f, 2 + kSheetSlack), s.radius)));
+    keep = hn::Or(keep, hn::And(front, about));
   }
   // Append to the queue and to the list.
   if (hn::AllFalse(f, hn::Or(drawn, keep))) return;

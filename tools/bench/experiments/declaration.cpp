@@ -26,7 +26,7 @@ CLI::Validator one_of(const std::vector<std::string>& known) {
 
 /// The scenes that can be named, for the help and for errors.
 constexpr char kScenes[] =
-    "fractal, window, city, cornell, box-lamp, or files of meshes and clouds";
+    "fractal, window, city, cornell, box-lamp, ajar, or files of meshes and clouds";
 
 }  // namespace
 

@@ -47,6 +47,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_formats_experiment();
 [[nodiscard]] Experiment make_glossy_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
+[[nodiscard]] Experiment make_hunt_experiment();
 [[nodiscard]] Experiment make_instructions_experiment();
 [[nodiscard]] Experiment make_knob_experiment();
 [[nodiscard]] Experiment make_model_experiment();
@@ -59,6 +60,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_sort_experiment();
 [[nodiscard]] Experiment make_specks_experiment();
 [[nodiscard]] Experiment make_stability_experiment();
+[[nodiscard]] Experiment make_truth_experiment();
 [[nodiscard]] Experiment make_verify_experiment();
 
 /// Runs an experiment that measures rows, and publishes a report whenever there are more rows.

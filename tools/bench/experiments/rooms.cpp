@@ -25,29 +25,6 @@
 namespace ptc::bench {
 namespace {
 
-Image image_of(const PathPicture& paths, unsigned width, unsigned height) {
-  Image image{width, height, {}};
-  for (std::size_t i = 0; i < paths.a.size(); ++i) image.pixels.push_back(paths.at(i));
-  return image;
-}
-
-/// Returns the factor by which a picture is shown: nine in ten of its lit pixels are below white.
-float exposure_of(const Image& image) {
-  std::vector<float> light;
-  for (const glm::vec3& p : image.pixels) {
-    if (const float most = std::max({p.x, p.y, p.z}); most > 0) light.push_back(most);
-  }
-  if (light.empty()) return 1;
-  const auto ninth = light.begin() + static_cast<std::ptrdiff_t>(light.size() * 9 / 10);
-  std::ranges::nth_element(light, ninth);
-  return 0.9F / *ninth;
-}
-
-Image scaled(Image image, float factor) {
-  for (glm::vec3& pixel : image.pixels) pixel *= factor;
-  return image;
-}
-
 /// Writes both pictures and the map of their differences as layers of one file.
 void write_layers(const std::filesystem::path& path, const Image& ours, const Image& paths,
                   const std::vector<float>& errors) {
@@ -65,16 +42,30 @@ void write_layers(const std::filesystem::path& path, const Image& ours, const Im
   write_exr(path, ours.width, ours.height, layers);
 }
 
-/// A scene that is built, with everything that both pictures need.
-struct BuiltRoom {
-  Mesh mesh;
-  LightRig lights;
-  Camera camera;
-  std::uint64_t surfels = 0;
-  double build_seconds = 0;
-};
+}  // namespace
 
-/// Builds the container of a scene, and finds its camera.
+Image image_of(const PathPicture& paths, unsigned width, unsigned height) {
+  Image image{width, height, {}};
+  for (std::size_t i = 0; i < paths.a.size(); ++i) image.pixels.push_back(paths.at(i));
+  return image;
+}
+
+float exposure_of(const Image& image) {
+  std::vector<float> light;
+  for (const glm::vec3& p : image.pixels) {
+    if (const float most = std::max({p.x, p.y, p.z}); most > 0) light.push_back(most);
+  }
+  if (light.empty()) return 1;
+  const auto ninth = light.begin() + static_cast<std::ptrdiff_t>(light.size() * 9 / 10);
+  std::ranges::nth_element(light, ninth);
+  return 0.9F / *ninth;
+}
+
+Image scaled(Image image, float factor) {
+  for (glm::vec3& pixel : image.pixels) pixel *= factor;
+  return image;
+}
+
 BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
                      const std::filesystem::path& target, const RunOptions& run,
                      Progress& progress) {
@@ -103,8 +94,6 @@ BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
   room.camera.height = options.size[1];
   return room;
 }
-
-}  // namespace
 
 RoomRow compare_room(const Image& ours, const PathPicture& paths) {
   double sum = 0, difference = 0, square = 0, apart = 0, count = 0;

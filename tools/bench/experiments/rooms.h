@@ -51,6 +51,29 @@ struct Room {
   Image sheet;  ///< ours, paths and HDR-FLIP side by side
 };
 
+/// A scene that is built, with everything that both pictures need.
+struct BuiltRoom {
+  Mesh mesh;
+  LightRig lights;
+  Camera camera;
+  std::uint64_t surfels = 0;
+  double build_seconds = 0;
+};
+
+/// Builds the container of a scene, and finds its camera.
+/// @param target  path of the container
+/// @throws DataError when the scene is no mesh; RequestError; std::system_error
+[[nodiscard]] BuiltRoom build_room(const SceneChoice& choice, const RoomsOptions& options,
+                                   const std::filesystem::path& target, const RunOptions& run,
+                                   Progress& progress);
+
+/// Returns the mean of both halves of a picture.
+[[nodiscard]] Image image_of(const PathPicture& paths, unsigned width, unsigned height);
+/// Returns the factor by which a picture is shown: nine in ten of its lit pixels are below white.
+[[nodiscard]] float exposure_of(const Image& image);
+/// Returns a picture times a factor.
+[[nodiscard]] Image scaled(Image image, float factor);
+
 /// Builds and renders a scene with default options, traces paths from the same camera, and
 /// compares.
 /// @param work  directory for the container

@@ -57,6 +57,7 @@ LitScene procedural_scene(const SceneChoice& choice, std::uint64_t points) {
   if (choice.name == "fractal") return make_fractal(points);
   if (choice.name == "cornell") return make_cornell(CornellLamp::flat);
   if (choice.name == "box-lamp") return make_cornell(CornellLamp::box);
+  if (choice.name == "ajar") return make_ajar_rooms();
   return make_window_room();
 }
 

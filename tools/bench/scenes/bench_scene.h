@@ -19,7 +19,7 @@
 namespace ptc::bench {
 
 /// The words that name scenes without a file.
-inline constexpr std::array kSceneWords{"fractal", "window", "city", "cornell", "box-lamp"};
+inline constexpr std::array kSceneWords{"fractal", "window", "city", "cornell", "box-lamp", "ajar"};
 
 /// The choice of a scene: one of kSceneWords, or the file of a mesh or a cloud.
 struct SceneChoice {

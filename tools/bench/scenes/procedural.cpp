@@ -239,6 +239,57 @@ LitScene make_window_room() {
   return scene;
 }
 
+LitScene make_ajar_rooms() {
+  // Name the materials
+  LitScene scene;
+  Mesh& mesh = scene.mesh;
+  mesh.materials = {{.name = "white", .albedo = glm::vec3(0.75F)},
+                    {.name = "door", .albedo = {0.6F, 0.45F, 0.3F}},
+                    {.name = "floor", .albedo = {0.4F, 0.4F, 0.45F}},
+                    {.name = "red", .albedo = {0.65F, 0.1F, 0.08F}},
+                    {.name = "lamp", .albedo = glm::vec3(0.5F), .emission = glm::vec3(60, 55, 45)}};
+  // Add floor, ceiling and the walls around both rooms, which lie along x
+  constexpr float kWall = 0.2F, kHigh = 2.8F, kDeep = 4, kLeft = 4, kRight = 8.2F;
+  const float out = -kWall, far = kDeep + kWall, end = kRight + kWall;
+  add_box(mesh, {out, out, out}, {end, 0, far}, 2);
+  add_box(mesh, {out, kHigh, out}, {end, kHigh + kWall, far}, 0);
+  add_box(mesh, {out, 0, out}, {0, kHigh, far}, 0);
+  add_box(mesh, {kRight, 0, out}, {end, kHigh, far}, 0);
+  add_box(mesh, {0, 0, out}, {kRight, kHigh, 0}, 0);
+  add_box(mesh, {0, 0, kDeep}, {kRight, kHigh, far}, 0);
+  // Add the wall between them, with a doorway of 0.9 x 2.1 m
+  constexpr float kNear = 1.4F, kFar = 2.3F, kDoor = 2.1F;
+  add_box(mesh, {kLeft, 0, 0}, {kLeft + kWall, kHigh, kNear}, 0);
+  add_box(mesh, {kLeft, 0, kFar}, {kLeft + kWall, kHigh, kDeep}, 0);
+  add_box(mesh, {kLeft, kDoor, kNear}, {kLeft + kWall, kHigh, kFar}, 0);
+  // Add the door, 4 cm thick and turned by 30 degrees into the lit room
+  const glm::vec3 hinge(kLeft + kWall, 0.01F, kNear), up(0, kDoor - 0.02F, 0);
+  const glm::vec3 along = 0.89F * glm::vec3(0.5F, 0, 0.8660254F),
+                  thick = 0.04F * glm::vec3(0.8660254F, 0, -0.5F);
+  add_quad(mesh, hinge, along, up, 1);
+  add_quad(mesh, hinge + thick, up, along, 1);
+  add_quad(mesh, hinge, up, thick, 1);
+  add_quad(mesh, hinge + along, thick, up, 1);
+  add_quad(mesh, hinge, thick, along, 1);
+  add_quad(mesh, hinge + up, along, thick, 1);
+  // Add a table with balls in the dark room, and the lamp in the other
+  add_box(mesh, {1, 0.7F, 1.5F}, {2.2F, 0.75F, 3.1F}, 1);
+  for (int leg = 0; leg < 4; ++leg) {
+    const glm::vec3 at(leg % 2 == 0 ? 1.05F : 2.07F, 0, leg / 2 == 0 ? 1.55F : 2.97F);
+    add_box(mesh, at, at + glm::vec3(0.08F, 0.7F, 0.08F), 1);
+  }
+  add_ball(mesh, make_ball(5), {1.6F, 0.95F, 1.8F}, 0.2F, 0, 0, 0);
+  add_ball(mesh, make_ball(5), {1.5F, 0.95F, 2.3F}, 0.2F, 0, 0, 3);
+  add_ball(mesh, make_ball(5), {1.7F, 0.95F, 2.8F}, 0.2F, 0, 0, 0);
+  add_quad(mesh, {5.6F, kHigh - 0.02F, 1.5F}, {1, 0, 0}, {0, 0, 1}, 4);
+  scene.camera = {.position = {0.3, 1.6, 3.7},
+                  .look_at = {3.0, 1.0, 1.6},
+                  .vertical_fov = 1.0F,
+                  .width = 640,
+                  .height = 480};
+  return scene;
+}
+
 LitScene make_cornell(CornellLamp lamp) {
   // Name the materials
   LitScene scene;

@@ -26,6 +26,11 @@ struct LitScene {
 /// +y is up, and the unit is a metre.
 [[nodiscard]] LitScene make_window_room();
 
+/// Makes two rooms of 4 x 2.8 x 4 m with thick walls and a door between them that is ajar: a lamp
+/// below the ceiling of one lights the other, where the camera is, through the gap alone (after
+/// Veach and Guibas 1997, Metropolis light transport, figure 3). +y is up, and the unit is a metre.
+[[nodiscard]] LitScene make_ajar_rooms();
+
 /// The lamp of make_cornell().
 enum class CornellLamp {
   flat,  ///< a rectangle that shines downwards, just below the ceiling
