@@ -140,10 +140,10 @@ std::vector<Surfel> crowded_surfels(std::size_t count) {
 
 TEST_CASE("join: a cut at any end of a leaf gives the tree of one file", "[farm][join]") {
   for (const std::uint32_t leaf_points : {1U, 3U}) {
-    const Cloud cloud(crowded_surfels(120), leaf_points);
+    const Cloud cloud(crowded_surfels(70), leaf_points);
     const VerifyReport whole = verified(cloud.whole());
     const Cuts begins = cloud.leaf_begins();
-    REQUIRE(begins.size() > 15);
+    REQUIRE(begins.size() > 10);
     for (const std::size_t at : begins) {
       CAPTURE(leaf_points, at);
       cloud.join({at});
@@ -154,10 +154,10 @@ TEST_CASE("join: a cut at any end of a leaf gives the tree of one file", "[farm]
 
 TEST_CASE("join: any number of parts gives the tree of one file", "[farm][join]") {
   for (const std::uint32_t leaf_points : {1U, 16U}) {
-    const Cloud cloud(crowded_surfels(700), leaf_points);
+    const Cloud cloud(crowded_surfels(300), leaf_points);
     const VerifyReport whole = verified(cloud.whole());
     const Cuts begins = cloud.leaf_begins();
-    for (const std::size_t n : {1U, 2U, 7U, 40U, 10'000U}) {
+    for (const std::size_t n : {1U, 7U, 40U, 10'000U}) {
       CAPTURE(leaf_points, n);
       const Cuts cuts = every(begins, n);
       cloud.join(cuts);
@@ -189,7 +189,7 @@ TEST_CASE("join: clouds of few points or of one position make a scene of one par
 }
 
 TEST_CASE("join: a cut within a leaf is refused by the names of its parts", "[farm][join]") {
-  const Cloud cloud(random_surfels(200, 12), 8);
+  const Cloud cloud(random_surfels(100, 12), 8);
   const Cuts begins = cloud.leaf_begins();
   std::size_t refused = 0;
   for (std::size_t at = 1; at < cloud.size(); ++at) {
@@ -199,7 +199,7 @@ TEST_CASE("join: a cut within a leaf is refused by the names of its parts", "[fa
                       Catch::Contains(cloud.part(1).string()) && Catch::Contains("share a leaf"));
     ++refused;
   }
-  CHECK(refused > 100);
+  CHECK(refused > 40);
 }
 
 TEST_CASE("join: without the files of edges the scene has the same bytes", "[farm][join]") {
