@@ -4,16 +4,19 @@
 //   route, part, join    one task of a plan
 //   run       all tasks, on this machine
 //   status    how far they are
+//   export    the tasks for another scheduler
 #include <algorithm>
-#include <chrono>
+#include <span>
 
 #include <fmt/format.h>
 
+#include "engine/io/file/file.h"
 #include "engine/pipeline/farm/plan.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "format/node_page.h"
 #include "format/text.h"
 #include "tools/common.h"
+#include "tools/farm_export.h"
 #include "tools/farm_run.h"
 #include "tools/inputs.h"
 #include "tools/options.h"
@@ -43,10 +46,12 @@ constexpr char kExamples[] =
     "  ptcfarm run town.json --memory 8G\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
+    "  # Submit the tasks to Slurm\n"
+    "  ptcfarm export town.json --for slurm -o town.sh\n"
     "  # See how far the tasks are, and what failed\n"
     "  ptcfarm status town.json\n";
 
-enum class Action { plan, run, status, route, part, join };
+enum class Action { plan, run, status, export_tasks, route, part, join };
 
 struct Arguments {
   Action action = Action::plan;
@@ -55,6 +60,7 @@ struct Arguments {
   ptc::BuildRequest request;
   ptc::FarmOptions farm;
   std::size_t number = 0;
+  ptc::Scheduler scheduler = ptc::Scheduler::parallel;
 };
 
 void declare(ptc::Command& command, Arguments& arguments) {
@@ -64,13 +70,14 @@ void declare(ptc::Command& command, Arguments& arguments) {
                           {{"plan", Action::plan},
                            {"run", Action::run},
                            {"status", Action::status},
+                           {"export", Action::export_tasks},
                            {"route", Action::route},
                            {"part", Action::part},
                            {"join", Action::join}},
-                          "What to do: plan, run, status, or the kind of a task\n"
+                          "plan, run, status, export, or the kind of a task\n"
                           "plan measures the inputs and writes a plan. run runs its tasks, those "
-                          "that are done left out. status says how far they are. route, part and "
-                          "join run one task.")
+                          "that are done left out. status says how far they are. export writes "
+                          "them for another scheduler. route, part and join run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -80,7 +87,9 @@ void declare(ptc::Command& command, Arguments& arguments) {
              {".json", ".ptcx", ".ply", ".las", ".laz", ".e57"})
       ->type_name("FILE")
       ->group(ptc::kFilesGroup);
-  command.add_output("-o,--output", arguments.output, {".json"}, "Plan to write (.json)")
+  command
+      .add_output("-o,--output", arguments.output, {".json", ".sh"},
+                  "Plan (.json), or tasks for another scheduler, to write")
       ->required(false);
   command
       .add_output("--scene", arguments.scene, {".ptcx"},
@@ -106,6 +115,15 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
       ->group(kGroup);
   ptc::add_size(app, "--task-memory", arguments.farm.memory_bytes,
                 "Cap on the memory of each planned task")
+      ->group(kGroup);
+  ptc::add_choice<ptc::Scheduler>(app, "--for", arguments.scheduler,
+                                  {{"parallel", ptc::Scheduler::parallel},
+                                   {"slurm", ptc::Scheduler::slurm},
+                                   {"openjd", ptc::Scheduler::openjd}},
+                                  "Scheduler to export for: parallel, slurm or openjd\n"
+                                  "parallel and slurm are shell scripts: one calls GNU parallel, "
+                                  "one submits jobs to Slurm. openjd is a job template of Open Job "
+                                  "Description, which other farms take.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
                    "Number of the task among those of its kind")
@@ -141,6 +159,8 @@ std::vector<std::string> command_of(const ptc::FarmPlan& plan, const ptc::FarmTa
 
 ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   if (arguments.output.empty()) throw CLI::RequiredError("--output");
+  if (!ptc::has_ending(arguments.output, ".json"))
+    throw CLI::ValidationError("--output", "the name of a plan must end in .json");
   ptc::BuildRequest& request = arguments.request;
   if (arguments.files.empty() && request.city_points == 0)
     throw CLI::RequiredError("FILE or --city");
@@ -248,6 +268,21 @@ ptc::Outcome status(const Arguments& arguments) {
   return outcome;
 }
 
+ptc::Outcome export_tasks(const Arguments& arguments) {
+  if (arguments.output.empty()) throw CLI::RequiredError("--output");
+  const ptc::FarmPlan plan = only_plan(arguments);
+  if (ptc::same_name(arguments.output, plan.file))
+    throw CLI::ValidationError("--output", "it is the plan itself");
+  const std::string text = ptc::exported(plan, arguments.scheduler);
+  ptc::OutputFile file(arguments.output);
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["output"] = arguments.output.string();
+  outcome.summary = fmt::format("{}: {} tasks\n", arguments.output.string(), plan.tasks.size());
+  return outcome;
+}
+
 ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   switch (arguments.action) {
     case Action::plan:
@@ -256,6 +291,8 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
       return run(arguments, command, progress);
     case Action::status:
       return status(arguments);
+    case Action::export_tasks:
+      return export_tasks(arguments);
     case Action::route:
       return run_one(arguments, ptc::TaskKind::route, command, progress);
     case Action::part:

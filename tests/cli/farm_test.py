@@ -2,6 +2,8 @@
 
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +16,16 @@ from programs import BIN, ProgramTest, ball, run, write_ply
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "spec"))
 import verifier  # noqa: E402
 
+SBATCH = """#!/bin/sh
+here=$(dirname "$0")
+echo "$@" >> "$here/sbatch.log"
+cat > "$here/job"
+last=$(echo "$*" | sed 's/.*--array=0-\\([0-9]*\\).*/\\1/')
+for task in $(seq 0 "$last"); do
+  SLURM_ARRAY_TASK_ID=$task SLURM_JOB_ID=$task sh "$here/job" >&2 || exit 1
+done
+wc -l < "$here/sbatch.log"
+"""
 CHANNELS = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b", "red", "green", "blue",
             "intensity"]
 
@@ -64,13 +76,13 @@ class Farm(ProgramTest):
             with self.subTest(options):
                 one = self.here / "one.ptcx"
                 self.succeed("ptcbuild", first, second, *options, "-o", one)
-                self.plan(first, second, *options)
+                self.assertEqual(len(self.plan(first, second, *options)["cuts"]), 3)
                 self.run_plan()
                 self.check_same(one)
 
     def test_a_plan_of_one_part_and_a_plan_of_more_parts_than_there_are_cuts(self):
-        for parts in (1, 500):
-            self.plan(self.cloud, parts=parts)
+        for parts, cuts in ((1, 0), (500, 30)):
+            self.assertGreaterEqual(len(self.plan(self.cloud, parts=parts)["cuts"]), cuts)
             self.run_plan()
             self.check_same(self.scene)
 
@@ -134,6 +146,59 @@ class Farm(ProgramTest):
         self.assertGreaterEqual(facts["skipped"], 2)
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
         self.assertEqual([p.name for p in (self.here / "farm.parts").iterdir() if ".tmp-" in p.name], [])
+
+    def export(self, scheduler, name):
+        self.succeed("ptcfarm", "export", self.here / "farm.json", "--for", scheduler, "-o", self.here / name)
+        return self.here / name
+
+    def environment(self):
+        return dict(os.environ, PATH=f"{self.here}:{BIN}:{os.environ['PATH']}")
+
+    @unittest.skipUnless(shutil.which("parallel"), "GNU parallel is not installed")
+    def test_gnu_parallel_runs_what_is_exported(self):
+        self.plan(self.cloud, parts=3)
+        script = self.export("parallel", "farm.sh")
+        ran = subprocess.run(["sh", script, "--jobs", "2"], env=self.environment(), capture_output=True, text=True, timeout=200)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_the_script_for_slurm_submits_arrays_in_their_order(self):
+        """With an sbatch that runs each array at once and writes down its options."""
+        sbatch = self.here / "sbatch"
+        sbatch.write_text(SBATCH)
+        sbatch.chmod(0o755)
+        self.plan(self.cloud, parts=3)
+        script = self.export("slurm", "farm.sh")
+        ran = subprocess.run(["sh", script], env=self.environment(), capture_output=True, text=True, timeout=200)
+        self.assertEqual((ran.returncode, ran.stdout), (0, "1 2 3\n"), ran.stderr)
+        calls = (self.here / "sbatch.log").read_text().splitlines()
+        self.assertEqual([re.search(r"--array=(\S+)", call)[1] for call in calls], ["0-0", "0-2", "0-0"])
+        self.assertEqual([re.search(r"--dependency=(\S+)", call + " --dependency=")[1] if "afterok" in call else ""
+                          for call in calls], ["", "afterok:1", "afterok:2"])
+        for call in calls:
+            self.assertRegex(call, r"--requeue .*--mem=3\d\dM --time=\d+ ")
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_the_template_for_open_job_description_has_a_step_for_each_kind(self):
+        self.plan(self.cloud, parts=3)
+        job = json.loads(self.export("openjd", "job.json").read_text())
+        self.assertEqual(job["specificationVersion"], "jobtemplate-2023-09")
+        self.assertEqual([step["name"] for step in job["steps"]], ["route", "part", "join"])
+        self.assertEqual([step.get("dependencies") for step in job["steps"]],
+                         [None, [{"dependsOn": "route"}], [{"dependsOn": "part"}]])
+        for step in job["steps"]:
+            numbers, = step["parameterSpace"]["taskParameterDefinitions"]
+            run_line = step["script"]["actions"]["onRun"]
+            for number in range(int(numbers["range"].split("-")[1]) + 1):
+                words = [word.replace("{{Task.Param.Number}}", str(number)) for word in run_line["args"]]
+                self.succeed(run_line["command"], *words)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_an_export_does_not_replace_its_plan(self):
+        self.plan(self.cloud, parts=1)
+        for output, said in (("farm.json", "is the plan itself"), ("farm.txt", "must end in")):
+            self.assertIn(said, self.fail_with(2, "ptcfarm", "export", self.here / "farm.json", "-o", self.here / output))
+        self.assertIn("must end in .json", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "o.sh"))
 
     def test_other_or_damaged_plans_are_refused(self):
         path = self.here / "farm.json"
