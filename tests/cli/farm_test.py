@@ -80,6 +80,19 @@ class Farm(ProgramTest):
                 self.run_plan()
                 self.check_same(one)
 
+    def test_discs_so_wide_that_rounding_takes_them_out_of_their_part_are_refused(self):
+        wide = self.here / "wide.ply"
+        write_ply(wide, [(*point[:6], 1e5, *point[7:]) for point in ball(900)])
+        self.plan(wide)
+        failed = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn("a disc is so wide that rounding moves its point to the part before", failed.stderr)
+        self.plan(wide, "--profile", "exact")
+        self.run_plan()
+        one = self.here / "one.ptcx"
+        self.succeed("ptcbuild", wide, "--profile", "exact", "-o", one)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
+
     def test_a_plan_of_one_part_and_a_plan_of_more_parts_than_there_are_cuts(self):
         for parts, cuts in ((1, 0), (500, 30)):
             self.assertGreaterEqual(len(self.plan(self.cloud, parts=parts)["cuts"]), cuts)
