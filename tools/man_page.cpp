@@ -27,9 +27,9 @@ constexpr char kDate[] = "2026-11-28";  // when these texts were last revised
 constexpr std::size_t kWidth = 80;  // of a line of roff
 
 /// The programs that are installed, each of which has a manual page.
-constexpr std::array<std::string_view, 8> kPrograms{"ptcbake",  "ptcbuild", "ptcconvert",
-                                                    "ptcinfo",  "ptclight", "ptcrender",
-                                                    "ptcshade", "ptcverify"};
+constexpr std::array<std::string_view, 9> kPrograms{"ptcbake",   "ptcbuild", "ptcconvert",
+                                                    "ptcfarm",   "ptcinfo",  "ptclight",
+                                                    "ptcrender", "ptcshade", "ptcverify"};
 
 /// A text as roff takes it, without any markup.
 std::string roff(const std::string& text) {

@@ -10,6 +10,7 @@
 
 #include "engine/octree/octree.h"
 #include "engine/octree/page_order.h"
+#include "engine/octree/square_sum.h"
 #include "engine/sort/point_streams.h"
 #include "format/point_page.h"
 #include "format/scalar.h"
@@ -22,7 +23,7 @@ constexpr std::size_t kPointsAtOnce = std::size_t{1} << 16;  // points of a bloc
 /// Bounds and sums of points, as the superblock records them.
 struct Totals {
   std::array<double, 3> low{}, high{};
-  double area = 0;
+  SquareSum radii;
   std::array<double, 3> flux{};
 };
 
@@ -38,7 +39,7 @@ Totals totals_of(const PointPage& points, const Frame& frame) {
     }
     const double radius = points.radius(i);
     const double area = 2.0 * radius * radius;
-    totals.area += area;
+    totals.radii.add(points.radius(i));
     const Half3 radiance = points.radiance(i), emission = points.emission(i);
     for (std::size_t c = 0; c < 3; ++c) {
       totals.flux[c] +=
@@ -50,8 +51,8 @@ Totals totals_of(const PointPage& points, const Frame& frame) {
   return totals;
 }
 
-/// Adds the totals of one page to the superblock. Pages are added in their order, so that the sums
-/// depend on the points and the page size alone.
+/// Adds the totals of one page to the superblock, but for the area. Pages are added in their order,
+/// so that the flux depends on the points and the page size alone.
 void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
   const bool first = superblock.points == 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -61,7 +62,6 @@ void include(Superblock& superblock, const Totals& page, std::uint64_t points) {
         first ? page.high[k] : std::max(superblock.bounds_high[k], page.high[k]);
     superblock.flux[k] += page.flux[k];
   }
-  superblock.area += page.area;
   superblock.points += points;
 }
 
@@ -86,7 +86,7 @@ class Settled {
 
 /// Encodes the points of a block as pages, and adds their totals to the superblock.
 void add_block(std::span<const PointRecord> block, const FileHeader& file, const Executor& executor,
-               Superblock& superblock, PageOrder& order) {
+               Superblock& superblock, SquareSum& radii, PageOrder& order) {
   const std::size_t per_page = points_per_page(file);
   std::vector<ContainerWriter::Page> pages((block.size() - 1) / per_page + 1);
   std::vector<Totals> totals(pages.size());
@@ -99,20 +99,21 @@ void add_block(std::span<const PointRecord> block, const FileHeader& file, const
   });
   for (std::size_t i = 0; i < pages.size(); ++i) {
     include(superblock, totals[i], pages[i].summary.record_count);
+    radii.add(totals[i].radii);
     order.add(std::move(pages[i]));
   }
 }
 
-void save_totals(const Superblock& superblock, StateWriter& state) {
+void save_totals(const Superblock& superblock, const SquareSum& radii, StateWriter& state) {
   state.put(superblock.points);
-  state.put(superblock.area);
+  radii.save(state);
   for (const auto& numbers : {superblock.bounds_low, superblock.bounds_high, superblock.flux})
     state.put(numbers);
 }
 
-void load_totals(StateReader& state, Superblock& superblock) {
+void load_totals(StateReader& state, Superblock& superblock, SquareSum& radii) {
   superblock.points = state.get<std::uint64_t>();
-  superblock.area = state.get<double>();
+  radii.load(state);
   for (auto* numbers : {&superblock.bounds_low, &superblock.bounds_high, &superblock.flux}) {
     *numbers = state.get<std::array<double, 3>>();
   }
@@ -125,19 +126,21 @@ std::uint64_t held_pages_bytes(std::uint8_t page_shift) noexcept {
 }
 
 Superblock build_pages(PointStream& points, ContainerWriter& writer, const BuildOptions& options,
-                       const Executor& executor, Progress& progress,
-                       const Checkpoints& checkpoints) {
+                       const Executor& executor, Progress& progress, const Checkpoints& checkpoints,
+                       TreeEdges* edges) {
   // Begin with nothing, or where the checkpoint was made.
   const FileHeader& file = writer.header();
   Superblock superblock;
   superblock.leaf_points = options.leaf_points;
+  SquareSum radii;
 
   const std::uint32_t per_page = points_per_page(file);
   const Settled settled(writer);
   PageOrder order(writer, per_page, options.levels_per_stream);
   OctreeBuilder octree(order, options.leaf_points, file.frame.unit(), executor);
+  if (edges != nullptr) octree.record_edges();
   if (checkpoints.from != nullptr) {
-    load_totals(*checkpoints.from, superblock);
+    load_totals(*checkpoints.from, superblock, radii);
     order.load(*checkpoints.from, superblock.points);
     octree.load(*checkpoints.from, [&](std::uint32_t page) { return order.knows(page); });
   }
@@ -145,7 +148,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   std::uint64_t saved = superblock.points;
   std::vector<PointRecord> block(std::max<std::size_t>(kPointsAtOnce / per_page, 1) * per_page);
   while (const std::size_t count = read_full(points, block)) {
-    add_block(std::span(block).first(count), file, executor, superblock, order);
+    add_block(std::span(block).first(count), file, executor, superblock, radii, order);
     octree.add(std::span(block).first(count));
     writer.write_pages(order.take(), executor);
     progress.advance(count);
@@ -155,7 +158,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
       continue;
     saved = superblock.points;
     StateWriter state;
-    save_totals(superblock, state);
+    save_totals(superblock, radii, state);
     order.save(state);
     octree.save(state);
     checkpoints.save({superblock.points, block.back().key}, state.take());
@@ -166,6 +169,7 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
   writer.write_pages(order.take(), executor);
   order.finish_held(executor);
 
+  superblock.area = 2 * radii.value();
   superblock.nodes = tree.nodes;
   superblock.node_groups = tree.groups;
   superblock.levels = static_cast<std::uint16_t>(tree.levels);
@@ -173,6 +177,11 @@ Superblock build_pages(PointStream& points, ContainerWriter& writer, const Build
     const ChildRef root = order.placed(tree.root);
     superblock.root_page = root.page;
     superblock.root_slot = root.slot;
+  }
+  if (edges != nullptr) {
+    *edges = octree.take_edges();
+    edges->place([&](const ChildRef& ref) { return order.placed(ref); });
+    edges->radii = radii;
   }
   return superblock;
 }

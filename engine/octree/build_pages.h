@@ -11,6 +11,7 @@
 #include "engine/base/progress.h"
 #include "engine/base/stream.h"
 #include "engine/io/file/state_file.h"
+#include "engine/octree/tree_edges.h"
 #include "engine/store/writer.h"
 #include "format/point_record.h"
 
@@ -49,6 +50,8 @@ struct Checkpoints {
 /// Writes the pages of all points and nodes in one pass. The result is the same for any number of
 /// threads.
 /// @param points  ascending keys in the lattice of the writer's frame
+/// @param edges   gets the edges of the tree, when there is a point; excludes `checkpoints`. Null:
+///                nobody needs them
 /// @return  the superblock for ContainerWriter::finish(), with counts, bounds and totals filled in
 /// @throws DataError, FormatError when the state to resume from is invalid;
 ///         std::invalid_argument when a point emits light and WriterOptions::point_bytes is
@@ -58,6 +61,7 @@ struct Checkpoints {
 /// nodes three times: some 20 MB in all.
 [[nodiscard]] Superblock build_pages(PointStream& points, ContainerWriter& writer,
                                      const BuildOptions& options, const Executor& executor,
-                                     Progress& progress, const Checkpoints& checkpoints = {});
+                                     Progress& progress, const Checkpoints& checkpoints = {},
+                                     TreeEdges* edges = nullptr);
 
 }  // namespace ptc

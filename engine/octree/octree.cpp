@@ -13,68 +13,12 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
-#include <type_traits>
 #include <utility>
 
+#include "engine/octree/node_state.h"
 #include "engine/octree/page_order.h"
 
 namespace ptc {
-namespace {
-
-using KnowsPage = OctreeBuilder::KnowsPage;
-
-/// Saves a node field by field.
-void save_child(const NodeChild& child, StateWriter& state) {
-  state.put(static_cast<std::uint8_t>(child.ref.interior));
-  state.put(child.ref.page);
-  state.put(child.ref.slot);
-  state.put(child.ref.first_point);
-  state.put(child.ref.point_count);
-  const NodeSummary& node = child.node;
-  for (const double value : node.mean) state.put(value);
-  for (const double value : {node.radius, node.area, node.thickness}) state.put(value);
-  for (const double value : node.facing) state.put(value);
-  for (const auto& flux : node.flux) state.put(flux);
-  state.put(static_cast<std::uint8_t>(node.emits));
-  for (const auto& power : node.power) state.put(power);
-  state.put(node.greatest);
-  for (const float value : node.cone_axis) state.put(value);
-  state.put(node.cone_cos);
-}
-
-/// Loads a node that save_child() saved.
-/// @param knows   says whether a page may be one that groups lie on
-/// @param points  number of points so far, which its references must be below
-/// @throws DataError when it refers to what does not exist, or a number is not finite
-NodeChild load_child(StateReader& state, const KnowsPage& knows, std::uint64_t points) {
-  NodeChild child;
-  child.ref.interior = state.get<std::uint8_t>() != 0;
-  child.ref.page = state.get<std::uint32_t>();
-  child.ref.slot = state.get<std::uint16_t>();
-  child.ref.first_point = state.get_count(points);
-  child.ref.point_count = state.get<std::uint32_t>();
-  state.require(child.ref.interior ? knows(child.ref.page)
-                                   : child.ref.point_count <= points - child.ref.first_point,
-                "the tree's state refers to a group or to points that do not exist");
-  const auto load_number = [&](auto& value) {
-    value = state.get<std::remove_reference_t<decltype(value)>>();
-    state.require(std::isfinite(value), "a sum in the tree's state is not finite");
-  };
-  NodeSummary& node = child.node;
-  std::ranges::for_each(node.mean, load_number);
-  for (double* value : {&node.radius, &node.area, &node.thickness}) load_number(*value);
-  std::ranges::for_each(node.facing, load_number);
-  for (auto& flux : node.flux) std::ranges::for_each(flux, load_number);
-  node.emits = state.get<std::uint8_t>() != 0;
-  for (auto& power : node.power) std::ranges::for_each(power, load_number);
-  load_number(node.greatest);
-  std::ranges::for_each(node.cone_axis, load_number);
-  load_number(node.cone_cos);
-  return child;
-}
-
-}  // namespace
 
 OctreeBuilder::OctreeBuilder(GroupSink& sink, std::uint32_t leaf_points, double unit,
                              const Executor& executor)
@@ -103,6 +47,12 @@ int OctreeBuilder::common(std::size_t at, std::size_t other) const {
 int OctreeBuilder::level_before(std::size_t at) const {
   const int level = common_level(last_key_, window_[at].key);
   return level < kLatticeBits ? level : level + common_rank_level(rank_ - 1, rank_);
+}
+
+/// Returns the points of a piece, which the window still has.
+std::span<const PointRecord> OctreeBuilder::points_of(const Piece& piece) const {
+  return std::span(window_).subspan(static_cast<std::size_t>(piece.first - window_first_),
+                                    piece.count);
 }
 
 /// Returns a piece to fill, with the memory of one that was used before.
@@ -149,17 +99,24 @@ void OctreeBuilder::cut(bool last) {
 /// Builds all pieces of the window, joins them, and removes their points.
 void OctreeBuilder::build(bool last) {
   cut(last);
-  executor_.for_each(piece_count_, [this](std::size_t i, unsigned thread) {
+  const auto is_last = [&](std::size_t i) { return last && i + 1 == piece_count_; };
+  executor_.for_each(piece_count_, [&](std::size_t i, unsigned thread) {
     Piece& piece = pieces_[i];
     piece.groups.clear();
-    const auto points = std::span(window_).subspan(
-        static_cast<std::size_t>(piece.first - window_first_), piece.count);
-    piece.top = builders_[thread].build(points, piece.first, piece.rank, piece.groups);
+    piece.kept.clear();
+    const bool at_edge = edges_ && (piece.first == 0 || is_last(i));
+    piece.top = builders_[thread].build(points_of(piece), piece.first, piece.rank, piece.groups,
+                                        at_edge ? &piece.kept : nullptr);
   });
   std::size_t done = 0;
-  for (Piece& piece : std::span(pieces_).first(piece_count_)) {
+  for (std::size_t i = 0; i < piece_count_; ++i) {
+    Piece& piece = pieces_[i];
     join(piece);
     done += piece.count;
+    if (!edges_) continue;
+    const EdgeRecorder::Built built{piece.top, piece.kept, places_, points_of(piece)};
+    if (piece.first == 0) edges_->begin(built);
+    if (is_last(i)) edges_->end(built);
   }
   window_.erase(window_.begin(), window_.begin() + static_cast<std::ptrdiff_t>(done));
   window_first_ += done;
@@ -213,7 +170,9 @@ NodeChild OctreeBuilder::close(std::uint64_t end) {
   path_.pop_back();
   encoded_.clear();
   append_group(group, encoded_);
-  return {emit(encoded_, end), summarise_children(group.children)};
+  const ChildRef placed = emit(encoded_, end);
+  if (edges_) edges_->close(group, placed);
+  return {placed, summarise_children(group.children)};
 }
 
 void OctreeBuilder::save(StateWriter& state) const {

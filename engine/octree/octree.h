@@ -13,13 +13,15 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "engine/base/executor.h"
 #include "engine/io/file/state_file.h"
+#include "engine/octree/node_state.h"
 #include "engine/octree/subtree.h"
+#include "engine/octree/tree_edges.h"
 #include "format/node_page.h"
 #include "format/point_record.h"
 
@@ -53,8 +55,6 @@ class OctreeBuilder {
  public:
   /// The most points of a cell that is built by one thread, unless leaf_points is more.
   static constexpr std::uint32_t kSubtreePoints = 4096;
-  /// Says whether a page may be one that GroupSink::add() returned.
-  using KnowsPage = std::function<bool(std::uint32_t page)>;
 
   /// @param leaf_points  1 to kMaxLeafPoints
   /// @param unit         lattice unit in scene units
@@ -67,7 +67,7 @@ class OctreeBuilder {
   /// Saves the state between two calls of add(), for a builder with the same arguments.
   void save(StateWriter& state) const;
   /// Resumes from a saved state, before the first call of add().
-  /// @param knows  says whether a page may be one that the sink returned
+  /// @param knows  whether a page may be one that the sink returned
   /// @throws DataError, FormatError when the state is invalid
   void load(StateReader& state, const KnowsPage& knows);
 
@@ -83,6 +83,12 @@ class OctreeBuilder {
   /// Builds what is left, and closes all cells. Call once.
   [[nodiscard]] Result finish();
 
+  /// Takes down the edges of the tree, before the first call of add(). save() does not save them.
+  void record_edges() { edges_.emplace(); }
+  /// Returns the edges of a tree that has a point, but for the radii. The references are those that
+  /// the sink returned. @pre record_edges(), finish()
+  [[nodiscard]] TreeEdges take_edges() { return edges_->take(result_.points); }
+
  private:
   /// A cell with few enough points for one thread, whose parent has too many; and the part of the
   /// tree below it.
@@ -91,13 +97,15 @@ class OctreeBuilder {
     std::size_t count = 0;    ///< its points
     std::uint64_t rank = 0;   ///< rank of its first point among the points with the same key
     int shared = 0;  ///< level of the smallest cell that holds its first point and the point before
-    MortonKey before;      ///< key of the point before
-    NodeChild top;         ///< the node that stands for the piece
-    SubtreeGroups groups;  ///< its groups; they refer to each other by number
+    MortonKey before;             ///< key of the point before
+    NodeChild top;                ///< the node that stands for the piece
+    SubtreeGroups groups;         ///< its groups; they refer to each other by number
+    std::vector<NodeGroup> kept;  ///< the same with exact sums, where the edges need them
   };
 
   [[nodiscard]] int common(std::size_t at, std::size_t other) const;
   [[nodiscard]] int level_before(std::size_t at) const;
+  [[nodiscard]] std::span<const PointRecord> points_of(const Piece& piece) const;
   [[nodiscard]] Piece& new_piece();
   void cut(bool last);
   void build(bool last);
@@ -122,6 +130,7 @@ class OctreeBuilder {
   std::vector<NodeGroup> path_;   ///< open cells, from the root down
   NodeChild current_;             ///< the node closed last, which is in no cell yet
   std::vector<std::byte> encoded_;
+  std::optional<EdgeRecorder> edges_;  ///< set by record_edges()
   Result result_;
 };
 

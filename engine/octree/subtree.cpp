@@ -51,10 +51,12 @@ NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64
 }
 
 NodeChild SubtreeBuilder::build(std::span<const PointRecord> points, std::uint64_t first,
-                                std::uint64_t rank, SubtreeGroups& out) {
+                                std::uint64_t rank, SubtreeGroups& out,
+                                std::vector<NodeGroup>* exact) {
   return build(points, first, rank, [&](const NodeGroup& group, std::uint64_t end) {
     const std::size_t begin = out.bytes.size();
     append_group(group, out.bytes);
+    if (exact) exact->push_back(group);
     out.groups.push_back({begin, out.bytes.size() - begin, end});
     return ChildRef{.interior = true, .page = static_cast<std::uint32_t>(out.groups.size() - 1)};
   });

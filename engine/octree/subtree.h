@@ -55,8 +55,10 @@ class SubtreeBuilder {
   [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
                                 std::uint64_t rank, const Emit& emit);
   /// Builds the tree of all points of one cell, and appends its groups to `out`.
+  /// @param exact  gets the groups as they are before they are encoded; null: nobody needs them
   [[nodiscard]] NodeChild build(std::span<const PointRecord> points, std::uint64_t first,
-                                std::uint64_t rank, SubtreeGroups& out);
+                                std::uint64_t rank, SubtreeGroups& out,
+                                std::vector<NodeGroup>* exact = nullptr);
 
  private:
   void build(std::size_t begin, std::size_t end, std::size_t depth, NodeChild& node);

@@ -76,6 +76,7 @@ class Usage(ProgramTest):
                         "ptcrender": [self.scene, "-o", self.here / "o.png"],
                         "ptcshade": [self.scene, "-o", self.here / "o.ply"],
                         "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
+                        "ptcfarm": ["plan", self.scene, "-o", self.here / "o.json"],
                         "ptcbuild": [self.cloud, "-o", self.here / "o.ptcx"],
                         "ptcbench": ["accuracy", self.mesh, "-o", self.here / "o"]}[program]
             for option, value in (("--memory", "much"), ("--memory", "0"), ("--memory", "-1"),
@@ -113,13 +114,16 @@ class Usage(ProgramTest):
                           "--samples=0", "--samples=3", "--exposure=inf", "--layer=haze=a.png",
                           "--layer=direct=a.exr", "--layer=direct", "--camera=0,0,0,0,0,0"],
             "ptcconvert": ["--codec=", "--page-size=64"],
+            "ptcfarm": ["--parts=-1", "--parts=10001", "--task-memory=much", "--number=-1", "--leaf=0", "--city=x",
+                        "--output=o.txt", "--scene=o.ply", "--page-size=3K"],
         }
         operands = {"ptcbuild": [self.mesh, "-o", self.here / "o.ptcx"],
                     "ptclight": [self.scene, "-o", self.here / "o.ptcx"],
                     "ptcshade": [self.scene, "-o", self.here / "o.ply"],
                     "ptcbake": [self.scene, "-o", self.here / "o.png"],
                     "ptcrender": [self.scene, "-o", self.here / "o.png"],
-                    "ptcconvert": [self.scene, self.here / "o.ptcx"]}
+                    "ptcconvert": [self.scene, self.here / "o.ptcx"],
+                    "ptcfarm": ["plan", self.scene]}
         for program, options in cases.items():
             for option in options:
                 self.assertIn(option.split("=")[0], self.fail_with(2, program, *operands[program], option))

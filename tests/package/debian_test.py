@@ -41,7 +41,7 @@ class Debian(unittest.TestCase):
         self.assertIn("usr/include/ptc/ptc.h", headers)
         for ending in ("libptc.a", "libptc-store.a", "ptcConfig.cmake", "pkgconfig/ptc.pc", "pkgconfig/ptc-store.pc"):
             self.assertTrue(any(name.endswith(ending) for name in headers), ending)
-        for program in ("ptcbuild", "ptclight", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify"):
+        for program in ("ptcbuild", "ptcfarm", "ptclight", "ptcshade", "ptcrender", "ptcconvert", "ptcinfo", "ptcverify"):
             self.assertIn(f"usr/bin/{program}", tools)
             self.assertIn(f"usr/share/zsh/vendor-completions/_{program}", tools)
         self.assertFalse(any("site-functions" in name for name in tools))

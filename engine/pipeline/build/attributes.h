@@ -149,6 +149,8 @@ class AttributeSorts {
   /// @param points  their records, whose keys are used
   void add(const AttributePlan& plan, std::span<const PointRecord> points, std::size_t input,
            std::span<const std::byte> rows, std::uint64_t first);
+  /// Adds values of one group, as AttributePlan::fill() made them.
+  void add(std::size_t group, std::span<const PointRecord> values) { sorts_[group]->add(values); }
   /// Number of groups.
   [[nodiscard]] std::size_t size() const noexcept { return sorts_.size(); }
   /// Bytes of temporary files that the expected points take.

@@ -41,10 +41,13 @@ constexpr std::size_t kSampleKeys = 1 << 16;  // positions that the sort's split
 constexpr std::size_t kMaxContainerRecords = std::size_t{1} << 14;
 
 /// Drops every second position of a sample that is twice as large as the sort needs.
-void thin(std::vector<glm::dvec3>& sample) {
+/// @param step  of how many points one is in the sample; doubles with it, so that the points of all
+///              files have the same share
+void thin(std::vector<glm::dvec3>& sample, std::uint64_t& step) {
   if (sample.size() < 2 * kSampleKeys) return;
   for (std::size_t i = 0; i < sample.size() / 2; ++i) sample[i] = sample[2 * i];
   sample.resize(sample.size() / 2);
+  step *= 2;
 }
 
 /// Returns a grid of 256 x 256 positions on the ground of the city, in scene units.
@@ -415,8 +418,10 @@ void Clouds::read_points(PointFile& file, bool alone, Cloud& cloud, Progress& pr
     }
     emits |= std::any_of(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count),
                          [](const Surfel& s) { return s.emission != glm::vec3(0); });
-    for (std::size_t i = 0; i < count; i += 64) sample.push_back(block[i].position);
-    thin(sample);
+    for (std::size_t i = 0; i < count; ++i) {
+      if ((cloud.points + i) % sample_step == 0) sample.push_back(block[i].position);
+    }
+    thin(sample, sample_step);
     watch.add(file.source->attributes());
     cloud.points += count;
     progress.advance(count);

@@ -62,6 +62,7 @@ struct Clouds {
   std::vector<Cloud> files;
   Bounds bounds;                   ///< of all points, scene units
   std::vector<glm::dvec3> sample;  ///< positions of an even share of the points, scene units
+  std::uint64_t sample_step = 1;   ///< of how many points one is in the sample
   std::uint64_t points = 0;        ///< in all files
   /// How the points are completed, without the resources; empty when all have normals and radii.
   std::optional<ScanOptions> scan;

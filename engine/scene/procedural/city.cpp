@@ -178,7 +178,8 @@ void sample_facet(const Facet& facet, const FacetRows& rows, const glm::dvec3& b
 // Streams the surfels of the blocks, of which it holds one at a time.
 class CitySource final : public PointSource {
  public:
-  explicit CitySource(std::uint64_t count) : layout_(lay_out(count)) {}
+  CitySource(const Layout& layout, const CityBlocks& blocks)
+      : layout_(layout), blocks_(blocks), block_(blocks.first) {}
 
   std::size_t next(std::span<Surfel> out) override {
     std::size_t filled = 0;
@@ -198,7 +199,7 @@ class CitySource final : public PointSource {
   bool fetch() {
     points_.clear();
     taken_ = 0;
-    while (points_.empty() && block_ < layout_.blocks) {
+    while (points_.empty() && block_ < blocks_.end) {
       const BlockPlace place = block_place(block_);
       const glm::dvec3 corner = block_corner(place);
       float carry = 0.5f;
@@ -207,13 +208,14 @@ class CitySource final : public PointSource {
         const FacetRows rows(facet, static_cast<float>(layout_.spacing), carry);
         sample_facet(facet, rows, corner, ++seed, points_);
       }
-      ++block_;
+      block_ += blocks_.step;
     }
     return !points_.empty();
   }
 
   Layout layout_;
-  std::uint64_t block_ = 0;
+  CityBlocks blocks_;
+  std::uint64_t block_;         // the next one
   std::vector<Surfel> points_;  // of the current block
   std::size_t taken_ = 0;       // points of it that were handed out
 };
@@ -236,7 +238,16 @@ void add_facet(const Facet& facet, const glm::dvec3& block, Mesh& mesh) {
 }  // namespace
 
 std::unique_ptr<PointSource> make_city(std::uint64_t count) {
-  return std::make_unique<CitySource>(count);
+  const Layout layout = lay_out(count);
+  return std::make_unique<CitySource>(layout, CityBlocks{.end = layout.blocks});
+}
+
+std::unique_ptr<PointSource> make_city(std::uint64_t count, const CityBlocks& blocks) {
+  return std::make_unique<CitySource>(lay_out(count), blocks);
+}
+
+std::uint64_t city_blocks(std::uint64_t count) {
+  return lay_out(count).blocks;
 }
 
 LightRig city_lights() {

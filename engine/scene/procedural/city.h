@@ -25,6 +25,17 @@ namespace ptc {
 /// @param count  wanted points; from a thousand on, the stream is within 5 % of it
 /// Memory: one block's points, about 4 MB.
 [[nodiscard]] std::unique_ptr<PointSource> make_city(std::uint64_t count);
+
+/// Some of the blocks of a city, by their numbers along the spiral.
+struct CityBlocks {
+  std::uint64_t first = 0;
+  std::uint64_t end = 0;   ///< number after the last block, at most city_blocks()
+  std::uint64_t step = 1;  ///< takes the first of every so many blocks, 1 or more
+};
+/// Makes some of the blocks of make_city(count), as they come there.
+[[nodiscard]] std::unique_ptr<PointSource> make_city(std::uint64_t count, const CityBlocks& blocks);
+/// Returns the number of blocks of make_city(count).
+[[nodiscard]] std::uint64_t city_blocks(std::uint64_t count);
 /// Returns the sun and the sky of the formula that lights make_city().
 [[nodiscard]] LightRig city_lights();
 /// Returns a box that holds every point of make_city(count) and every vertex of city_mesh(count),

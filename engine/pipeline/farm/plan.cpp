@@ -1,0 +1,255 @@
+// Measures the inputs as a build on one machine does, then writes down what the tasks follow from.
+#include "engine/pipeline/farm/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/build_inputs.h"
+#include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/farm/cuts.h"
+#include "engine/pipeline/farm/plan_json.h"
+#include "engine/pipeline/scene_record.h"
+#include "format/checksum.h"
+
+namespace ptc {
+namespace {
+
+// Seconds of one core for a point, and bytes of a point in a container: those of a city of 20
+// million points, doubled for slower machines and for channels.
+constexpr double kRouteSeconds = 2.2e-7, kPartSeconds = 7e-7;
+constexpr std::uint64_t kStoredBytes = 26;
+constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
+// The share of a task's memory that the points of a part may take, so that its sort spills nothing.
+constexpr std::uint64_t kSortShare = 2;
+constexpr std::size_t kMaxParts = 10'000;
+
+void check_request(const BuildRequest& request) {
+  check_page_shift(request.page_shift);
+  require_request(!request.mesh && !request.backdrop, "inputs",
+                  "a farm builds clouds and containers: build meshes to a container first");
+  require_request(request.append.empty() && !request.resume && !request.moment, "append",
+                  "`append`, `resume` and moving scenes are for one machine");
+  require_request(request.city_points == 0 || (request.inputs.empty() && !request.original_order),
+                  "city_points", "`city_points` excludes files and the order of inputs");
+  require_request(!request.lights, "lights",
+                  "a farm builds points with the light that they have: light them afterwards");
+}
+
+void check_inputs(const BuildInputs& inputs) {
+  require_request(!inputs.has_meshes(), "inputs",
+                  "a farm builds clouds and containers: build the meshes to a container first");
+  require_request(!inputs.clouds.scan, "inputs",
+                  "a farm builds points with normals and radii: build each cloud that lacks them "
+                  "to a container first");
+  require_request(!inputs.relight, "inputs",
+                  "lamps of one input would light another: build these on one machine");
+}
+
+std::vector<MortonKey> sorted_keys(const std::vector<glm::dvec3>& places, const Frame& frame) {
+  std::vector<MortonKey> keys;
+  keys.reserve(places.size());
+  for (const glm::dvec3& p : places) keys.push_back(encode_morton(frame.to_lattice(to_array(p))));
+  std::ranges::sort(keys);
+  return keys;
+}
+
+/// Returns how many parts let the points of each fit in the memory of a task.
+std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
+  if (options.parts > 0) return options.parts;
+  const std::uint64_t memory = std::max<std::uint64_t>(options.memory_bytes / kSortShare, 1);
+  const std::uint64_t groups = plan.row().group_bytes.size();
+  const std::uint64_t bytes = plan.points * (groups + 1) * 2 * sizeof(PointRecord);
+  return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
+}
+
+void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
+  // Route each input
+  const std::uint64_t row = plan.row().bytes();
+  std::vector<std::string> routes, parts;
+  for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
+    const FarmInput& input = plan.inputs[i];
+    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::route, .number = i});
+    if (!input.path.empty()) task.inputs = {input.path};
+    task.outputs = {plan.output(TaskKind::route, i)};
+    task.memory_bytes = memory_bytes;
+    task.disk_bytes = input.points * row;
+    task.seconds = static_cast<double>(input.points) * kRouteSeconds;
+    routes.push_back(task.name());
+  }
+
+  // Build each range of all of them, and join the parts
+  FarmTask join{.kind = TaskKind::join, .outputs = {plan.scene}, .memory_bytes = memory_bytes};
+  for (std::size_t i = 0; i < plan.parts(); ++i) {
+    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::part, .number = i});
+    task.after = routes;
+    for (std::size_t k = 0; k < routes.size(); ++k)
+      task.inputs.push_back(plan.output(TaskKind::route, k));
+    task.outputs = {plan.output(TaskKind::part, i)};
+    task.memory_bytes = memory_bytes;
+    task.disk_bytes = plan.points / plan.parts() * kStoredBytes;
+    task.seconds = static_cast<double>(plan.points / plan.parts()) * kPartSeconds;
+    parts.push_back(task.name());
+    join.inputs.push_back(task.outputs[0]);
+  }
+  join.after = std::move(parts);
+  join.disk_bytes = plan.parts() * 4096;
+  join.seconds = 0.01 * static_cast<double>(plan.parts());
+  plan.tasks.push_back(std::move(join));
+}
+
+/// Divides the city into shares of some million points.
+std::vector<FarmInput> city_shares(std::uint64_t points) {
+  const std::uint64_t blocks = city_blocks(points);
+  const std::uint64_t shares = std::clamp<std::uint64_t>(points / kSharePoints, 1, blocks);
+  std::vector<FarmInput> inputs;
+  for (std::uint64_t i = 0; i < shares; ++i) {
+    inputs.push_back({.blocks = {.first = blocks * i / shares, .end = blocks * (i + 1) / shares},
+                      .points = points / shares});
+  }
+  return inputs;
+}
+
+/// Returns positions of points of some blocks of the city.
+std::vector<glm::dvec3> sample_city(std::uint64_t points) {
+  constexpr std::uint64_t kBlocks = 128, kEvery = 4;
+  const std::uint64_t blocks = city_blocks(points);
+  const auto city = make_city(points, {.end = blocks, .step = blocks / kBlocks + 1});
+  std::vector<glm::dvec3> places;
+  std::vector<Surfel> surfels(1 << 12);
+  while (const std::size_t count = city->next(surfels)) {
+    for (std::size_t i = 0; i < count; i += kEvery) places.push_back(surfels[i].position);
+  }
+  return places;
+}
+
+}  // namespace
+
+const char* name_of(TaskKind kind) noexcept {
+  switch (kind) {
+    case TaskKind::route:
+      return "route";
+    case TaskKind::part:
+      return "part";
+    case TaskKind::join:
+      break;
+  }
+  return "join";
+}
+
+std::string FarmTask::name() const {
+  return kind == TaskKind::join ? "join" : fmt::format("{}.{}", name_of(kind), number);
+}
+
+std::filesystem::path FarmPlan::folder() const {
+  return scene.parent_path() / (scene.stem().string() + ".parts");
+}
+
+std::filesystem::path FarmPlan::output(TaskKind kind, std::size_t number) const {
+  switch (kind) {
+    case TaskKind::route:
+      return folder() / fmt::format("route.{}", number);
+    case TaskKind::part:
+      return folder() / fmt::format("{}.ptcx", number);
+    case TaskKind::join:
+      break;
+  }
+  return scene;
+}
+
+AttributePlan FarmPlan::attributes() const {
+  AttributePlan plan;
+  for (const FarmInput& input : inputs) {
+    if (!input.channels.empty()) static_cast<void>(plan.add_input(input.channels, input.taken));
+  }
+  const std::vector<Channel>& wanted = meta.channels;
+  if (request.original_order) plan.add_original_index();
+  for (std::size_t i = 0; i < std::min(wanted.size(), plan.channels().size()); ++i) {
+    if (wanted[i].no_value) static_cast<void>(plan.mark_unknown(i));
+  }
+  if (plan.channels() != wanted)
+    throw DataError(file.string() + ": the channels are not those of the inputs");
+  return plan;
+}
+
+RangeRow FarmPlan::row() const {
+  RangeRow row;
+  const AttributePlan plan = attributes();
+  for (std::size_t group = 0; group < plan.groups(); ++group)
+    row.group_bytes.push_back(plan.group_bytes(group));
+  return row;
+}
+
+FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
+                   const std::filesystem::path& file, const FarmOptions& options,
+                   Progress& progress) {
+  // Measure the inputs
+  check_request(request);
+  const MeshLimits limits{.reading = request.run.memory_bytes,
+                          .kept = request.run.memory_bytes,
+                          .traced = request.run.memory_bytes,
+                          .textures = texture_cap(request.run),
+                          .temp_directory = roomiest_temp_dir(request.run, scene)};
+  StageSeconds seconds;
+  const BuildInputs inputs =
+      read_inputs(request, BoundsFrom::points, nullptr, limits, seconds, progress);
+  check_inputs(inputs);
+  if (inputs.bounds.empty()) throw DataError("the inputs have no points");
+
+  // Write down what follows from them
+  FarmPlan plan{.file = std::filesystem::absolute(file),
+                .scene = std::filesystem::absolute(scene),
+                .request = request};
+  for (const Clouds::Cloud& cloud : inputs.clouds.files) {
+    if (cloud.place)
+      throw RequestError("inputs",
+                         "a farm builds clouds where they are: build scene files on one "
+                         "machine");
+    plan.inputs.push_back({.path = std::filesystem::absolute(cloud.path),
+                           .points = cloud.points,
+                           .channels = cloud.channels,
+                           .taken = cloud.taken});
+  }
+  if (request.city_points > 0) plan.inputs = city_shares(request.city_points);
+  plan.frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high));
+  plan.emits = inputs.clouds.emits;
+  plan.points = request.city_points + inputs.clouds.points;
+  plan.meta = complete_record(make_meta(request, inputs), 0, nullptr, request.page_shift);
+  check_meta(plan.meta, request.page_shift, plan.emits ? kEmittingPointBytes : kPointBytes);
+
+  // Choose the cuts
+  const bool city = request.city_points > 0;
+  const std::vector<MortonKey> keys =
+      sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
+  plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
+  add_tasks(plan, options.memory_bytes);
+  for (FarmTask& task : plan.tasks) task.command = options.command(plan, task);
+  return plan;
+}
+
+void write_plan(FarmPlan& plan) {
+  const std::string text = plan_to_json(plan);
+  plan.id = xxh3_64(std::as_bytes(std::span(text)));
+  OutputFile file(plan.file);
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+}
+
+FarmPlan read_plan(const std::filesystem::path& file) {
+  const InputFile in(file);
+  std::string text(static_cast<std::size_t>(in.size()), '\0');
+  in.read_at(0, std::as_writable_bytes(std::span(text)));
+  FarmPlan plan = plan_from_json(text, std::filesystem::absolute(file));
+  plan.id = xxh3_64(std::as_bytes(std::span(text)));
+  return plan;
+}
+
+}  // namespace ptc

@@ -1,0 +1,113 @@
+// The plan of a build on many machines: what is built, where it is cut, and the tasks.
+//
+//   make_plan()      inputs --> bounds, sample --> frame, cuts          plan.json
+//   route.0 ...      an input --> its points by range                   scene.parts/route.0
+//   part.0 ...       a range of all inputs --> sorted, built            scene.parts/0.ptcx, its
+//   edges join             edges of all parts --> the top of the tree         scene.ptcx
+//
+// Every task is one command line. It can be run again at any time, publishes what it makes by
+// rename, and leaves a mark when it is done, by which it does nothing the next time.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/build/attributes.h"
+#include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/farm/range_file.h"
+#include "engine/scene/procedural/city.h"
+#include "format/morton.h"
+#include "format/schema.h"
+
+namespace ptc {
+
+/// The kinds of tasks, in the order in which they run.
+enum class TaskKind { route, part, join };
+
+/// Returns the name of a kind, "route".
+[[nodiscard]] const char* name_of(TaskKind kind) noexcept;
+
+/// One task of a plan.
+struct FarmTask {
+  TaskKind kind = TaskKind::route;
+  std::size_t number = 0;            ///< among the tasks of its kind
+  std::vector<std::string> command;  ///< from the program on
+  std::vector<std::string> after;    ///< names of the tasks that must be done before
+  std::vector<std::filesystem::path> inputs, outputs;
+  std::uint64_t memory_bytes = 0;  ///< the cap that it is given
+  std::uint64_t disk_bytes = 0;    ///< of its outputs, about
+  double seconds = 0;              ///< expected, on one core
+
+  /// Returns its name in the plan, "part.3".
+  [[nodiscard]] std::string name() const;
+};
+
+/// What a task of the kind route takes: a cloud of the plan, as it was measured, or some blocks of
+/// the city.
+struct FarmInput {
+  std::filesystem::path path;     ///< empty: the city
+  CityBlocks blocks;              ///< of the city
+  std::uint64_t points = 0;       ///< of the city, about
+  std::vector<Channel> channels;  ///< in the order of its rows
+  std::vector<bool> taken;        ///< as for AttributePlan::add_input()
+};
+
+struct FarmPlan;
+
+/// What make_plan() may choose.
+struct FarmOptions {
+  /// Returns the command line of a task.
+  std::function<std::vector<std::string>(const FarmPlan& plan, const FarmTask& task)> command;
+  std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
+  std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
+};
+
+/// A plan, as its file says it.
+struct FarmPlan {
+  std::filesystem::path file;   ///< the plan's own file
+  std::filesystem::path scene;  ///< the scene that the last task writes
+  std::uint64_t id = 0;         ///< hash of the file, which what tasks write names
+  BuildRequest request;         ///< how points are stored, and which are taken
+  std::vector<FarmInput> inputs;
+  Frame frame;
+  bool emits = false;
+  std::uint64_t points = 0;  ///< expected
+  Meta meta;                 ///< record of each part, complete
+  std::vector<MortonKey> cuts;
+  std::vector<FarmTask> tasks;
+
+  /// Returns the number of parts.
+  [[nodiscard]] std::size_t parts() const noexcept { return cuts.size() + 1; }
+  /// Returns the folder of the parts, "scene.parts".
+  [[nodiscard]] std::filesystem::path folder() const;
+  /// Returns the file that a task writes.
+  [[nodiscard]] std::filesystem::path output(TaskKind kind, std::size_t number) const;
+  /// Returns the channels as the inputs have them.
+  /// @throws DataError when they do not give the channels of the record
+  [[nodiscard]] AttributePlan attributes() const;
+  /// Returns what a point takes in a file of ranges.
+  [[nodiscard]] RangeRow row() const;
+};
+
+/// Measures the inputs and plans the tasks. Points are read once.
+/// @param request  what to build. Inputs are clouds and containers whose points have normals and
+///                 radii and keep the light that they have, or the city
+/// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
+///         light clouds, and for fields that a farm does not take; as build_container()
+[[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
+                                 const std::filesystem::path& file, const FarmOptions& options,
+                                 Progress& progress);
+
+/// Writes a plan to its file, and sets its identity.
+/// @throws std::system_error
+void write_plan(FarmPlan& plan);
+/// Reads a plan.
+/// @throws DataError that names the file; std::system_error
+[[nodiscard]] FarmPlan read_plan(const std::filesystem::path& file);
+
+}  // namespace ptc

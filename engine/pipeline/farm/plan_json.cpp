@@ -1,0 +1,220 @@
+#include "engine/pipeline/farm/plan_json.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "engine/base/error.h"
+
+namespace ptc {
+namespace {
+
+using OrderedJson = nlohmann::ordered_json;
+
+constexpr char kFormat[] = "ptcfarm plan 1";
+
+OrderedJson to_json(const std::filesystem::path& path) {
+  return path.string();
+}
+
+OrderedJson to_json(const std::vector<std::filesystem::path>& paths) {
+  OrderedJson list = OrderedJson::array();
+  for (const auto& path : paths) list.push_back(path.string());
+  return list;
+}
+
+OrderedJson to_json(const Channel& channel) {
+  OrderedJson json{{"name", channel.name},
+                   {"type", static_cast<unsigned>(channel.type)},
+                   {"components", channel.components},
+                   {"group", channel.group},
+                   {"role", static_cast<unsigned>(channel.role)},
+                   {"colour_space", static_cast<unsigned>(channel.colour_space)},
+                   {"unit", channel.unit},
+                   {"scale", channel.scale},
+                   {"offset", channel.offset},
+                   {"size", channel.size}};
+  if (channel.no_value) json["no_value"] = *channel.no_value;
+  return json;
+}
+
+Channel channel_of(const OrderedJson& json) {
+  Channel channel{
+      .name = json.at("name"),
+      .type = static_cast<ChannelType>(json.at("type").get<std::uint8_t>()),
+      .components = json.at("components"),
+      .group = json.at("group"),
+      .role = static_cast<ChannelRole>(json.at("role").get<std::uint8_t>()),
+      .colour_space = static_cast<ColourSpace>(json.at("colour_space").get<std::uint8_t>()),
+      .unit = json.at("unit"),
+      .scale = json.at("scale"),
+      .offset = json.at("offset"),
+      .size = json.at("size")};
+  if (json.contains("no_value")) channel.no_value = json.at("no_value").get<std::uint64_t>();
+  return channel;
+}
+
+OrderedJson to_json(const std::vector<Channel>& channels) {
+  OrderedJson list = OrderedJson::array();
+  for (const Channel& channel : channels) list.push_back(to_json(channel));
+  return list;
+}
+
+std::vector<Channel> channels_of(const OrderedJson& json) {
+  std::vector<Channel> channels;
+  for (const OrderedJson& channel : json) channels.push_back(channel_of(channel));
+  return channels;
+}
+
+OrderedJson to_json(const BuildRequest& request) {
+  const Selection& selection = request.selection;
+  OrderedJson json{{"city_points", request.city_points},
+                   {"original_order", request.original_order},
+                   {"remove_duplicates", request.remove_duplicates},
+                   {"profile", static_cast<unsigned>(request.profile)},
+                   {"page_shift", request.page_shift},
+                   {"leaf_points", request.tree.leaf_points},
+                   {"levels_per_stream", request.tree.levels_per_stream},
+                   {"every", selection.every},
+                   {"classes", selection.classes}};
+  if (selection.channels) json["channels"] = *selection.channels;
+  if (selection.level) json["level"] = *selection.level;
+  if (selection.box) {
+    const glm::dvec3 &low = selection.box->low, &high = selection.box->high;
+    json["box"] = {low.x, low.y, low.z, high.x, high.y, high.z};
+  }
+  return json;
+}
+
+BuildRequest request_of(const OrderedJson& json) {
+  BuildRequest request;
+  request.city_points = json.at("city_points");
+  request.original_order = json.at("original_order");
+  request.remove_duplicates = json.at("remove_duplicates");
+  const auto profile = json.at("profile").get<unsigned>();
+  if (profile > static_cast<unsigned>(Profile::compact))
+    throw DataError("there is no such profile");
+  request.profile = static_cast<Profile>(profile);
+  request.page_shift = json.at("page_shift");
+  request.tree.leaf_points = json.at("leaf_points");
+  request.tree.levels_per_stream = json.at("levels_per_stream");
+  Selection& selection = request.selection;
+  selection.every = json.at("every");
+  selection.classes = json.at("classes").get<std::vector<std::uint64_t>>();
+  if (json.contains("channels"))
+    selection.channels = json.at("channels").get<std::vector<std::string>>();
+  if (json.contains("level")) selection.level = json.at("level").get<unsigned>();
+  if (json.contains("box")) {
+    const auto box = json.at("box").get<std::array<double, 6>>();
+    selection.box = {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
+  }
+  return request;
+}
+
+OrderedJson to_json(const FarmTask& task) {
+  return {{"name", task.name()},
+          {"kind", name_of(task.kind)},
+          {"number", task.number},
+          {"command", task.command},
+          {"after", task.after},
+          {"inputs", to_json(task.inputs)},
+          {"outputs", to_json(task.outputs)},
+          {"memory_bytes", task.memory_bytes},
+          {"disk_bytes", task.disk_bytes},
+          {"seconds", task.seconds}};
+}
+
+FarmTask task_of(const OrderedJson& json) {
+  FarmTask task;
+  const auto kind = json.at("kind").get<std::string>();
+  for (const TaskKind known : {TaskKind::route, TaskKind::part, TaskKind::join}) {
+    if (kind == name_of(known)) task.kind = known;
+  }
+  if (kind != name_of(task.kind)) throw DataError("there are no tasks `" + kind + "`");
+  task.number = json.at("number");
+  task.command = json.at("command").get<std::vector<std::string>>();
+  task.after = json.at("after").get<std::vector<std::string>>();
+  for (const auto& path : json.at("inputs")) task.inputs.emplace_back(path.get<std::string>());
+  for (const auto& path : json.at("outputs")) task.outputs.emplace_back(path.get<std::string>());
+  if (task.outputs.empty()) throw DataError("the task " + task.name() + " has no outputs");
+  task.memory_bytes = json.at("memory_bytes");
+  task.disk_bytes = json.at("disk_bytes");
+  task.seconds = json.at("seconds");
+  return task;
+}
+
+/// Keys are numbers of 126 bits: two halves, the high one first.
+OrderedJson to_json(const MortonKey& key) {
+  return {key.high, key.low};
+}
+
+MortonKey key_of(const OrderedJson& json) {
+  return {json.at(0).get<std::uint64_t>(), json.at(1).get<std::uint64_t>()};
+}
+
+FarmPlan plan_of(const OrderedJson& json) {
+  if (json.at("format") != kFormat) throw DataError("it is no plan of this version");
+  FarmPlan plan;
+  plan.scene = json.at("scene").get<std::string>();
+  plan.points = json.at("points");
+  plan.emits = json.at("emits");
+  plan.request = request_of(json.at("request"));
+  plan.frame = {json.at("frame").at("origin").get<std::array<double, 3>>(),
+                json.at("frame").at("edge")};
+  for (const OrderedJson& input : json.at("inputs")) {
+    plan.inputs.push_back(
+        {.path = input.at("path").get<std::string>(),
+         .blocks = {.first = input.at("blocks").at(0), .end = input.at("blocks").at(1)},
+         .points = input.at("points"),
+         .channels = channels_of(input.at("channels")),
+         .taken = input.at("taken").get<std::vector<bool>>()});
+  }
+  plan.meta = {channels_of(json.at("channels")),
+               json.at("texts").get<std::map<std::string, std::string>>()};
+  for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
+  for (const OrderedJson& task : json.at("tasks")) plan.tasks.push_back(task_of(task));
+  if (plan.tasks.empty() || plan.tasks.back().kind != TaskKind::join)
+    throw DataError("its last task does not join the parts");
+  return plan;
+}
+
+}  // namespace
+
+std::string plan_to_json(const FarmPlan& plan) {
+  OrderedJson inputs = OrderedJson::array(), cuts = OrderedJson::array(),
+              tasks = OrderedJson::array();
+  for (const FarmInput& input : plan.inputs) {
+    inputs.push_back({{"path", input.path.string()},
+                      {"blocks", {input.blocks.first, input.blocks.end}},
+                      {"points", input.points},
+                      {"channels", to_json(input.channels)},
+                      {"taken", input.taken}});
+  }
+  for (const MortonKey& cut : plan.cuts) cuts.push_back(to_json(cut));
+  for (const FarmTask& task : plan.tasks) tasks.push_back(to_json(task));
+  const OrderedJson json{{"format", kFormat},
+                         {"scene", to_json(plan.scene)},
+                         {"points", plan.points},
+                         {"emits", plan.emits},
+                         {"request", to_json(plan.request)},
+                         {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
+                         {"inputs", inputs},
+                         {"channels", to_json(plan.meta.channels)},
+                         {"texts", plan.meta.text},
+                         {"cuts", cuts},
+                         {"tasks", tasks}};
+  return json.dump(1) + "\n";
+}
+
+FarmPlan plan_from_json(const std::string& text, const std::filesystem::path& file) {
+  try {
+    FarmPlan plan = plan_of(OrderedJson::parse(text));
+    plan.file = file;
+    return plan;
+  } catch (const nlohmann::json::exception& error) {
+    throw DataError(file.string() + ": " + error.what());
+  } catch (const DataError& error) {
+    throw DataError(file.string() + ": " + error.what());
+  }
+}
+
+}  // namespace ptc

@@ -1,0 +1,116 @@
+// The points that a task of a farm has sorted into ranges of the curve, in one file.
+//
+//   block | block | ... | table: range, offset, points and checksum of each block | its place
+//
+// Blocks begin at multiples of kDirectBytes and pass by the page cache: they are read once, by
+// other machines. A file system that has no direct transfers gets usual ones.
+//
+// A block has points of one range. The blocks of a range, in the order of the file, are its points
+// in the order of the input: first the records, then the values of each group of channels.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <future>
+#include <span>
+#include <vector>
+
+#include "engine/base/memory.h"
+#include "engine/io/file/file.h"
+#include "engine/sort/direct_file.h"
+#include "format/morton.h"
+#include "format/point_record.h"
+
+namespace ptc {
+
+/// The bytes of a point in a block: its record, and its values in each group of channels.
+struct RangeRow {
+  std::vector<std::size_t> group_bytes;
+  /// Returns the bytes of a point.
+  [[nodiscard]] std::size_t bytes() const noexcept;
+};
+
+/// A block of the file.
+struct RangeBlock {
+  std::uint32_t range = 0;
+  std::uint64_t offset = 0;  ///< bytes from the start of the file
+  std::uint64_t points = 0;
+  std::uint64_t xxh3 = 0;  ///< of its bytes
+};
+
+/// Writes the points of an input by range.
+/// Memory: `memory_bytes`.
+class RangeWriter {
+ public:
+  /// @param target  appears whole, when finish() is called
+  /// @param plan    identity of the plan
+  /// @param cuts    where ranges begin, but for the first; ascending
+  /// @throws std::system_error; std::invalid_argument when the memory is too small for the ranges
+  RangeWriter(const std::filesystem::path& target, std::uint64_t plan,
+              std::span<const MortonKey> cuts, RangeRow row, std::uint64_t memory_bytes);
+
+  /// Adds points.
+  /// @param values  for each group, records with the values of the points
+  void add(std::span<const PointRecord> points, std::span<const std::vector<PointRecord>> values);
+  /// Writes what is left and publishes the file.
+  void finish();
+
+  /// The least memory that a number of ranges needs, bytes.
+  [[nodiscard]] static std::uint64_t least_memory(std::size_t ranges, const RangeRow& row);
+
+ private:
+  struct Open {
+    std::vector<PointRecord> points;
+    std::vector<std::byte> values;  ///< group after group, each with room for a whole block
+  };
+
+  [[nodiscard]] std::size_t range_of(const MortonKey& key) const;
+  void flush(std::size_t range);
+  void write(std::span<const std::byte> bytes);
+
+  std::filesystem::path target_, partial_;
+  TemporaryName temporary_;  ///< removes what was not published
+  DirectFile file_;
+  std::uint64_t end_ = 0;  ///< of what was written
+  std::uint64_t plan_;
+  std::vector<MortonKey> cuts_;
+  RangeRow row_;
+  std::size_t block_points_;
+  std::vector<Open> open_;
+  std::array<Arena, 2> packed_;  ///< a block on its way to the file, and the one before
+  std::size_t turn_ = 0;
+  std::vector<RangeBlock> blocks_;
+  std::future<void> writing_;  ///< last, so that its end is awaited before the other members go
+};
+
+/// Reads the points of one range.
+class RangeReader {
+ public:
+  /// @throws DataError when the file is damaged or of another plan; std::system_error
+  RangeReader(const std::filesystem::path& path, std::uint64_t plan, RangeRow row);
+
+  /// Returns the number of points of a range.
+  [[nodiscard]] std::uint64_t points(std::uint32_t range) const;
+  /// Starts to read a range.
+  void open(std::uint32_t range);
+  /// Reads the next block of the range. @return whether there was one
+  /// @throws DataError when it is damaged
+  [[nodiscard]] bool next();
+  /// The points of the block.
+  [[nodiscard]] std::span<const PointRecord> block() const noexcept { return points_; }
+  /// Writes the values of a group into records that have the keys of the block's points.
+  void values(std::size_t group, std::vector<PointRecord>& records) const;
+
+ private:
+  std::filesystem::path path_;
+  DirectFile file_;
+  RangeRow row_;
+  std::vector<RangeBlock> blocks_;
+  std::uint32_t range_ = 0;
+  std::size_t at_ = 0;
+  Arena bytes_;
+  std::vector<PointRecord> points_;
+};
+
+}  // namespace ptc

@@ -1,0 +1,384 @@
+// A task leaves SCENE.parts/done/NAME with the identity of the plan behind everything that it has
+// written, or SCENE.parts/failed/NAME with the text of its error.
+#include "engine/pipeline/farm/tasks.h"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "engine/base/error.h"
+#include "engine/base/memory_budget.h"
+#include "engine/io/cloud/record.h"
+#include "engine/io/file/file.h"
+#include "engine/io/file/state_file.h"
+#include "engine/octree/build_pages.h"
+#include "engine/octree/rounding.h"
+#include "engine/parallel/thread_pool.h"
+#include "engine/pipeline/budgets.h"
+#include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/build/placed_points.h"
+#include "engine/pipeline/build/point_marks.h"
+#include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/parts/join_parts.h"
+#include "engine/pipeline/parts/part_edges.h"
+#include "engine/scene/procedural/city.h"
+#include "engine/store/reader.h"
+#include "engine/store/writer.h"
+
+namespace ptc {
+namespace {
+
+constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
+
+std::filesystem::path done_mark(const FarmPlan& plan, const FarmTask& task) {
+  return plan.folder() / "done" / task.name();
+}
+
+std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
+  return plan.folder() / "failed" / task.name();
+}
+
+/// Marks a task as done, and whether it has written its output: a part without points has none.
+void mark_done(const FarmPlan& plan, const FarmTask& task) {
+  std::filesystem::create_directories(done_mark(plan, task).parent_path());
+  StateWriter state;
+  state.put(plan.id);
+  state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
+  write_state(done_mark(plan, task), state.take());
+}
+
+/// Says whether a task is done. One whose output is gone is not, but for routes that no part needs
+/// any more.
+bool is_done(const FarmPlan& plan, const FarmTask& task) {
+  const std::filesystem::path mark = done_mark(plan, task);
+  if (!std::filesystem::exists(mark)) return false;
+  const std::vector<std::byte> bytes = read_state(mark);
+  StateReader state(bytes, mark.string());
+  if (state.get<std::uint64_t>() != plan.id) return false;
+  if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
+  return task.kind == TaskKind::route && std::ranges::all_of(plan.tasks, [&](const auto& other) {
+           return other.kind != TaskKind::part || is_done(plan, other);
+         });
+}
+
+/// Sends the points of one input to their ranges.
+class Route {
+ public:
+  Route(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress)
+      : plan_(plan),
+        number_(task.number),
+        executor_(run.threads),
+        progress_(progress),
+        attributes_(plan.attributes()),
+        values_(attributes_.groups()),
+        writer_(plan.output(TaskKind::route, task.number), plan.id, plan.cuts, plan.row(),
+                writer_bytes(run.memory_bytes)) {}
+
+  void run() {
+    const FarmInput& input = plan_.inputs[number_];
+    progress_.begin("route", input.points, "points");
+    if (input.path.empty()) {
+      feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput);
+    } else {
+      for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
+      const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
+      const std::uint64_t before = points_;
+      feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
+      if (points_ - before != input.points)
+        throw DataError(input.path.string() + ": the file changed since it was planned");
+    }
+    writer_.finish();
+    progress_.end();
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t writer_bytes(std::uint64_t cap) const {
+    MemoryBudget budget = budget_of(cap, "this route");
+    return budget.rest("the ranges", RangeWriter::least_memory(plan_.parts(), plan_.row()));
+  }
+
+  /// Returns the input's number among those that have channels.
+  [[nodiscard]] std::size_t input_number() const {
+    return static_cast<std::size_t>(std::count_if(
+        plan_.inputs.begin(), plan_.inputs.begin() + static_cast<std::ptrdiff_t>(number_),
+        [](const FarmInput& input) { return !input.channels.empty(); }));
+  }
+
+  void feed(PointSource& source, std::size_t input) {
+    while (const std::size_t count = source.next(surfels_)) {
+      const auto records = std::span(records_).first(count);
+      executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) records[i] = to_record(surfels_[i], plan_.frame);
+      });
+      for (std::size_t group = 0; group < values_.size(); ++group) {
+        values_[group].resize(count);
+        attributes_.fill(input, source.attributes(), points_, group, values_[group]);
+      }
+      writer_.add(records, values_);
+      points_ += count;
+      progress_.advance(count);
+    }
+  }
+
+  const FarmPlan& plan_;
+  std::size_t number_;
+  const ThreadPool executor_;
+  Progress& progress_;
+  AttributePlan attributes_;
+  std::vector<std::vector<PointRecord>> values_;
+  RangeWriter writer_;
+  std::vector<Surfel> surfels_ = std::vector<Surfel>(kBlock);
+  std::vector<PointRecord> records_ = std::vector<PointRecord>(kBlock);
+  std::uint64_t points_ = 0;  ///< number of the next point among all inputs
+};
+
+/// Refuses points that rounding has moved out of their part: then the part before would have to
+/// know them (spec/parts.md#writing).
+class WithinPart : public PointStream {
+ public:
+  WithinPart(PointStream& points, const MortonKey& first, std::string name)
+      : points_(points), first_(first), name_(std::move(name)) {}
+  std::size_t next(std::span<PointRecord> out) override {
+    const std::size_t count = points_.next(out);
+    if (count > 0 && out[0].key < first_) {
+      throw DataError(name_ +
+                      ": a disc is so wide that rounding moves its point to the part "
+                      "before: plan a profile that does not round");
+    }
+    return count;
+  }
+
+ private:
+  PointStream& points_;
+  MortonKey first_;
+  std::string name_;
+};
+
+/// Sorts and builds a range of all inputs.
+class Part {
+ public:
+  Part(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress)
+      : plan_(plan),
+        number_(task.number),
+        target_(plan.output(TaskKind::part, task.number)),
+        run_(run),
+        executor_(run.threads),
+        progress_(progress),
+        attributes_(plan.attributes()) {}
+
+  void run() {
+    open_routes();
+    const std::uint64_t points = count();
+    std::filesystem::remove(edges_path(target_));
+    if (points == 0) {  // a scene has no part without points
+      std::filesystem::remove(target_);
+      return;
+    }
+    progress_.begin("sort", points, "points");
+    sort(points);
+    progress_.begin("build", points, "points");
+    build();
+    progress_.end();
+  }
+
+ private:
+  void open_routes() {
+    for (std::size_t i = 0; i < plan_.inputs.size(); ++i)
+      routes_.push_back(plan_.output(TaskKind::route, i));
+  }
+
+  [[nodiscard]] RangeReader open(const std::filesystem::path& route) const {
+    return {route, plan_.id, plan_.row()};
+  }
+
+  [[nodiscard]] std::uint64_t count() const {
+    std::uint64_t points = 0;
+    for (const auto& route : routes_) points += open(route).points(range());
+    return points;
+  }
+
+  [[nodiscard]] std::uint32_t range() const { return static_cast<std::uint32_t>(number_); }
+
+  /// Gives the memory to the sorts: those of values get equal shares.
+  void sort(std::uint64_t points) {
+    MemoryBudget budget = budget_of(run_.memory_bytes, "this part");
+    budget.charge("pages that are written",
+                  ContainerWriter::writing_bytes(plan_.request.page_shift, executor_.threads()));
+    budget.charge("node pages that wait", held_pages_bytes(plan_.request.page_shift));
+    const std::size_t groups = attributes_.groups();
+    const std::uint64_t memory = budget.rest("the sort", kMinSortBytes * (groups + 1));
+    const SortOptions options{.memory_bytes = memory / (groups + 1),
+                              .temp_dirs = temp_dirs(run_, target_),
+                              .expected = points,
+                              .emits = plan_.emits};
+    const std::vector<MortonKey> sample = keys_of_range(points);
+    sorter_ = std::make_unique<ExternalSorter>(options, executor_, sample);
+    sorts_.emplace(attributes_, options, std::span<const std::filesystem::path>(), executor_,
+                   sample);
+    std::vector<PointRecord> values;
+    for (const auto& route : routes_) {
+      RangeReader reader = open(route);
+      reader.open(range());
+      while (reader.next()) {
+        sorter_->add(reader.block());
+        for (std::size_t group = 0; group < groups; ++group) {
+          reader.values(group, values);
+          sorts_->add(group, values);
+        }
+        progress_.advance(reader.block().size());
+      }
+    }
+  }
+
+  /// Returns keys of points that are spread over the range, for the splitters of the sort.
+  [[nodiscard]] std::vector<MortonKey> keys_of_range(std::uint64_t points) const {
+    constexpr std::uint64_t kKeys = 1 << 14;
+    if (points * 2 * sizeof(PointRecord) <= run_.memory_bytes / 4) return {};  // all fit in memory
+    std::vector<MortonKey> keys;
+    for (const auto& route : routes_) {
+      RangeReader reader = open(route);
+      reader.open(range());
+      while (reader.next()) {
+        for (std::size_t i = 0; i < reader.block().size(); i += points / kKeys + 1)
+          keys.push_back(reader.block()[i].key);
+      }
+    }
+    return keys;
+  }
+
+  void build() {
+    // Chain the streams
+    const MortonKey first = number_ > 0 ? plan_.cuts[number_ - 1] : MortonKey{};
+    const auto sorted = sorter_->finish();
+    PointStream* points = sorted.get();
+    std::unique_ptr<PointStream> unique, rounded;
+    if (plan_.request.remove_duplicates) {
+      unique = unique_points(*points);
+      points = unique.get();
+    }
+    if (is_rounded(plan_.request.profile)) {
+      rounded = round_points(*points, plan_.frame.unit(), executor_);
+      points = rounded.get();
+    }
+    WithinPart within(*points, first, target_.string());
+
+    // Write the pages, the values, and the edges of the tree
+    BuildPlan made{.frame = plan_.frame, .meta = plan_.meta, .emits = plan_.emits};
+    ContainerWriter writer(target_, {.page_shift = plan_.request.page_shift,
+                                     .codec = codec_of(plan_.request.profile),
+                                     .uuid = content_uuid(*sorter_, *sorts_, plan_.frame,
+                                                          plan_.request, plan_.meta, {}),
+                                     .frame = plan_.frame,
+                                     .point_bytes = made.point_bytes()});
+    TreeEdges edges;
+    const Superblock superblock =
+        build_pages(within, writer, plan_.request.tree, executor_, progress_, {}, &edges);
+    write_values(superblock.points, writer);
+    static_cast<void>(writer.finish(plan_.meta, superblock));
+    write_edges(target_, ContainerReader(target_).superblock().xxh3, edges);
+  }
+
+  void write_values(std::uint64_t points, ContainerWriter& writer) {
+    for (std::size_t group = 0; group < sorts_->size(); ++group) {
+      const auto sorted = sorts_->finish(group);
+      std::unique_ptr<PointStream> unique;
+      if (plan_.request.remove_duplicates) unique = unique_points(*sorted);
+      write_attribute_pages(unique ? *unique : *sorted,
+                            static_cast<std::uint8_t>(kFirstInputGroup + group),
+                            plan_.meta.channels, points, writer);
+    }
+  }
+
+  const FarmPlan& plan_;
+  std::size_t number_;
+  std::filesystem::path target_;
+  const RunOptions& run_;
+  const ThreadPool executor_;
+  Progress& progress_;
+  AttributePlan attributes_;
+  std::vector<std::filesystem::path> routes_;
+  std::unique_ptr<ExternalSorter> sorter_;
+  std::optional<AttributeSorts> sorts_;
+};
+
+/// Removes what the routes wrote, and temporary files that killed tasks have left.
+void remove_leftovers(const FarmPlan& plan) {
+  std::error_code gone;
+  for (const FarmTask& task : plan.tasks) {
+    if (task.kind == TaskKind::route) std::filesystem::remove(task.outputs.at(0), gone);
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
+    if (entry.path().filename().string().find(".tmp-") != std::string::npos)
+      std::filesystem::remove(entry.path(), gone);
+  }
+}
+
+/// Joins the parts that have points.
+void join(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
+  std::vector<std::filesystem::path> parts;
+  for (std::size_t i = 0; i < plan.parts(); ++i) {
+    const std::filesystem::path part = plan.output(TaskKind::part, i);
+    if (std::filesystem::exists(part)) parts.push_back(part);
+  }
+  static_cast<void>(join_parts(parts, plan.scene, run, progress));
+  remove_leftovers(plan);
+}
+
+void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
+             Progress& progress) {
+  std::filesystem::create_directories(plan.folder());
+  switch (task.kind) {
+    case TaskKind::route:
+      return Route(plan, task, run, progress).run();
+    case TaskKind::part:
+      return Part(plan, task, run, progress).run();
+    case TaskKind::join:
+      return join(plan, run, progress);
+  }
+}
+
+}  // namespace
+
+TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
+  if (is_done(plan, task)) return TaskState::done;
+  return std::filesystem::exists(failed_mark(plan, task)) ? TaskState::failed : TaskState::waiting;
+}
+
+std::string failure_of(const FarmPlan& plan, const FarmTask& task) {
+  std::ifstream file(failed_mark(plan, task));
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text) {
+  std::filesystem::create_directories(failed_mark(plan, task).parent_path());
+  OutputFile file(failed_mark(plan, task));
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+}
+
+bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
+              Progress& progress) {
+  if (is_done(plan, task)) return false;
+  for (const std::string& name : task.after) {
+    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
+    if (before == plan.tasks.end() || !is_done(plan, *before))
+      throw DataError(plan.file.string() + ": " + task.name() + " needs " + name +
+                      ", which is not done");
+  }
+  std::filesystem::remove(failed_mark(plan, task));
+  try {
+    perform(plan, task, run, progress);
+  } catch (const std::exception& error) {
+    note_failure(plan, task, error.what());
+    throw;
+  }
+  mark_done(plan, task);
+  return true;
+}
+
+}  // namespace ptc

@@ -1,0 +1,30 @@
+// The tasks of a plan.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/farm/plan.h"
+#include "engine/pipeline/run.h"
+
+namespace ptc {
+
+/// How far a task is.
+enum class TaskState { waiting, failed, done };
+
+/// Returns how far a task is, by the marks in the folder of the plan.
+[[nodiscard]] TaskState state_of(const FarmPlan& plan, const FarmTask& task);
+/// Returns what a failed task said last; empty when it is not failed.
+[[nodiscard]] std::string failure_of(const FarmPlan& plan, const FarmTask& task);
+/// Notes that a task failed. @param text  what it said
+void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
+
+/// Runs a task, unless it is done, and marks it as done or failed.
+/// @param run  the resources of the task
+/// @return  false when it was done before
+/// @throws DataError when a task that must be done before is not; as the task
+bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
+              Progress& progress);
+
+}  // namespace ptc

@@ -1,0 +1,249 @@
+"""ptcfarm: the tasks of a plan build the scene that one machine builds."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import unittest
+from pathlib import Path
+
+from programs import BIN, ProgramTest, ball, run, write_ply
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "spec"))
+import verifier  # noqa: E402
+
+SBATCH = """#!/bin/sh
+here=$(dirname "$0")
+echo "$@" >> "$here/sbatch.log"
+cat > "$here/job"
+last=$(echo "$*" | sed 's/.*--array=0-\\([0-9]*\\).*/\\1/')
+for task in $(seq 0 "$last"); do
+  SLURM_ARRAY_TASK_ID=$task SLURM_JOB_ID=$task sh "$here/job" >&2 || exit 1
+done
+wc -l < "$here/sbatch.log"
+"""
+CHANNELS = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b", "red", "green", "blue",
+            "intensity"]
+
+
+class Farm(ProgramTest):
+    def digest(self, scene):
+        return json.loads(self.succeed("ptcverify", scene, "--level", "4", "--json").stdout)["tree_digest"]
+
+    def shaded(self, scene):
+        out = self.here / "shaded.ply"
+        self.succeed("ptcshade", scene, "-o", out)
+        return out.read_bytes()
+
+    def plan(self, *arguments, parts=4):
+        self.succeed("ptcfarm", "plan", *arguments, "--parts", parts, "-o", self.here / "farm.json", "--task-memory", "256M")
+        return json.loads((self.here / "farm.json").read_text())
+
+    def run_plan(self, *options):
+        return json.loads(self.succeed("ptcfarm", "run", self.here / "farm.json", "--memory", "1G", "--json", *options).stdout)
+
+    def check_same(self, one):
+        """Compares the scene of the plan with the container of one machine."""
+        scene = self.here / "farm.ptcx"
+        self.assertEqual(self.digest(scene), self.digest(one))
+        self.assertEqual(self.shaded(scene), self.shaded(one))
+        facts = [json.loads(self.succeed("ptcinfo", path, "--json").stdout) for path in (scene, one)]
+        for fact in ("points", "bounds", "channels", "text"):
+            self.assertIn(fact, facts[0])
+            self.assertEqual(facts[0][fact], facts[1][fact], fact)
+
+    def test_a_city_has_the_bits_of_one_machine_in_every_profile(self):
+        for profile in ("exact", "compact"):
+            with self.subTest(profile):
+                one = self.here / "one.ptcx"
+                self.succeed("ptcbuild", "--city", "8k", "--profile", profile, "--page-size", "4K", "-o", one)
+                plan = self.plan("--city", "8k", "--profile", profile, "--page-size", "4K", parts=6)
+                self.assertEqual(len(plan["cuts"]), 5)
+                self.assertEqual(self.run_plan()["ran"], 8)
+                self.check_same(one)
+                verifier.verify(str(self.here / "farm.ptcx"))
+
+    def test_clouds_of_other_channels_and_points_at_one_place(self):
+        first, second = self.here / "a.ply", self.here / "b.ply"
+        write_ply(first, [(*point, i % 251) for i, point in enumerate(ball(900))], CHANNELS)
+        points = ball(700, seed=3)
+        write_ply(second, points + points[:300])  # which lacks the channel of the first
+        for options in ([], ["--remove-duplicates", "--leaf", "2"], ["--original-order", "--every", "3"]):
+            with self.subTest(options):
+                one = self.here / "one.ptcx"
+                self.succeed("ptcbuild", first, second, *options, "-o", one)
+                self.assertEqual(len(self.plan(first, second, *options)["cuts"]), 3)
+                self.run_plan()
+                self.check_same(one)
+
+    def test_discs_so_wide_that_rounding_takes_them_out_of_their_part_are_refused(self):
+        wide = self.here / "wide.ply"
+        write_ply(wide, [(*point[:6], 1e5, *point[7:]) for point in ball(900)])
+        self.plan(wide)
+        failed = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn("a disc is so wide that rounding moves its point to the part before", failed.stderr)
+        self.plan(wide, "--profile", "exact")
+        self.run_plan()
+        one = self.here / "one.ptcx"
+        self.succeed("ptcbuild", wide, "--profile", "exact", "-o", one)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
+
+    def test_a_plan_of_one_part_and_a_plan_of_more_parts_than_there_are_cuts(self):
+        for parts, cuts in ((1, 0), (500, 30)):
+            self.assertGreaterEqual(len(self.plan(self.cloud, parts=parts)["cuts"]), cuts)
+            self.run_plan()
+            self.check_same(self.scene)
+
+    def test_each_task_is_a_command_that_can_be_run_again(self):
+        plan = self.plan("--city", "30k")
+        for task in plan["tasks"]:
+            for again in (False, True):
+                words = task["command"]
+                self.assertEqual(words[0], "ptcfarm")
+                facts = json.loads(self.succeed(*words, "--json").stdout)
+                self.assertEqual(facts["ran"], not again)
+            for output in task["outputs"]:
+                self.assertTrue(Path(output).exists(), output)
+        self.assertEqual(self.run_plan()["skipped"], len(plan["tasks"]))
+        # A part that is lost comes back with the same bytes, and so does the scene
+        part, scene = self.here / "farm.parts" / "2.ptcx", self.here / "farm.ptcx"
+        before = part.read_bytes(), scene.read_bytes()
+        part.unlink()
+        self.assertEqual(self.run_plan()["ran"], 2)  # the route and the part
+        scene.unlink()
+        self.assertEqual(self.run_plan()["ran"], 1)
+        self.assertEqual((part.read_bytes(), scene.read_bytes()), before)
+
+    def test_a_task_waits_for_those_before_it(self):
+        self.plan("--city", "30k")
+        message = run("ptcfarm", "part", self.here / "farm.json", "--number", "1")
+        self.assertEqual(message.returncode, 1)
+        self.assertIn("part.1 needs route.0, which is not done", message.stderr)
+
+    def test_a_failed_task_is_told_and_run_again(self):
+        cloud = self.here / "c.ply"
+        cloud.write_bytes(self.cloud.read_bytes())
+        self.plan(cloud)
+        whole = cloud.read_bytes()
+        cloud.write_bytes(whole[:-5])
+        failed = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn("route.0 failed:\n", failed.stderr)
+        self.assertIn(str(cloud), failed.stderr)
+        status = json.loads(self.succeed("ptcfarm", "status", self.here / "farm.json", "--json").stdout)
+        self.assertEqual((status["done"], status["failed"]), (0, 1))
+        self.assertIn(str(cloud), status["states"][0]["error"])
+        self.assertIn(str(cloud), self.succeed("ptcfarm", "status", self.here / "farm.json").stdout)
+        cloud.write_bytes(whole)
+        self.run_plan()
+        status = self.succeed("ptcfarm", "status", self.here / "farm.json").stdout
+        self.assertRegex(status, r"^\[#{30}\] 100 %, \d+ of \d+ tasks done, 0 failed")
+
+    def test_a_killed_run_goes_on_and_leaves_no_temporary_files(self):
+        one = self.here / "one.ptcx"
+        self.succeed("ptcbuild", "--city", "400k", "-o", one)
+        self.plan("--city", "400k")
+        command = [str(BIN / "ptcfarm"), "run", str(self.here / "farm.json"), "--threads", "1"]
+        child = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True)
+        done = self.here / "farm.parts" / "done"
+        while not all((done / name).exists() for name in ("route.0", "part.0")):
+            time.sleep(0.01)
+        os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
+        facts = self.run_plan()
+        self.assertGreaterEqual(facts["skipped"], 2)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
+        self.assertEqual([p.name for p in (self.here / "farm.parts").iterdir() if ".tmp-" in p.name], [])
+
+    def export(self, scheduler, name):
+        self.succeed("ptcfarm", "export", self.here / "farm.json", "--for", scheduler, "-o", self.here / name)
+        return self.here / name
+
+    def environment(self):
+        return dict(os.environ, PATH=f"{self.here}:{BIN}:{os.environ['PATH']}")
+
+    @unittest.skipUnless(shutil.which("parallel"), "GNU parallel is not installed")
+    def test_gnu_parallel_runs_what_is_exported(self):
+        self.plan(self.cloud, parts=3)
+        script = self.export("parallel", "farm.sh")
+        ran = subprocess.run(["sh", script, "--jobs", "2"], env=self.environment(), capture_output=True, text=True, timeout=200)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_the_script_for_slurm_submits_arrays_in_their_order(self):
+        """With an sbatch that runs each array at once and writes down its options."""
+        sbatch = self.here / "sbatch"
+        sbatch.write_text(SBATCH)
+        sbatch.chmod(0o755)
+        self.plan(self.cloud, parts=3)
+        script = self.export("slurm", "farm.sh")
+        ran = subprocess.run(["sh", script], env=self.environment(), capture_output=True, text=True, timeout=200)
+        self.assertEqual((ran.returncode, ran.stdout), (0, "1 2 3\n"), ran.stderr)
+        calls = (self.here / "sbatch.log").read_text().splitlines()
+        self.assertEqual([re.search(r"--array=(\S+)", call)[1] for call in calls], ["0-0", "0-2", "0-0"])
+        self.assertEqual([re.search(r"--dependency=(\S+)", call + " --dependency=")[1] if "afterok" in call else ""
+                          for call in calls], ["", "afterok:1", "afterok:2"])
+        for call in calls:
+            self.assertRegex(call, r"--requeue .*--mem=3\d\dM --time=\d+ ")
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_the_template_for_open_job_description_has_a_step_for_each_kind(self):
+        self.plan(self.cloud, parts=3)
+        job = json.loads(self.export("openjd", "job.json").read_text())
+        self.assertEqual(job["specificationVersion"], "jobtemplate-2023-09")
+        self.assertEqual([step["name"] for step in job["steps"]], ["route", "part", "join"])
+        self.assertEqual([step.get("dependencies") for step in job["steps"]],
+                         [None, [{"dependsOn": "route"}], [{"dependsOn": "part"}]])
+        for step in job["steps"]:
+            numbers, = step["parameterSpace"]["taskParameterDefinitions"]
+            run_line = step["script"]["actions"]["onRun"]
+            for number in range(int(numbers["range"].split("-")[1]) + 1):
+                words = [word.replace("{{Task.Param.Number}}", str(number)) for word in run_line["args"]]
+                self.succeed(run_line["command"], *words)
+        self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+
+    def test_an_export_does_not_replace_its_plan(self):
+        self.plan(self.cloud, parts=1)
+        for output, said in (("farm.json", "is the plan itself"), ("farm.txt", "must end in")):
+            self.assertIn(said, self.fail_with(2, "ptcfarm", "export", self.here / "farm.json", "-o", self.here / output))
+        self.assertIn("must end in .json", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "o.sh"))
+
+    def test_other_or_damaged_plans_are_refused(self):
+        path = self.here / "farm.json"
+        self.plan("--city", "30k")
+        text = path.read_text()
+        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 1", "ptcfarm plan 2"),
+                        text.replace('"kind": "join"', '"kind": "frob"'), text.replace('"points"', '"dots"')):
+            path.write_text(changed)
+            result = run("ptcfarm", "status", path)
+            self.assertEqual(result.returncode, 1, result.stderr)
+            self.assertIn(str(path), result.stderr)
+        # Another plan of the same name begins anew
+        path.write_text(text)
+        self.run_plan()
+        self.plan("--city", "30k", parts=3)
+        self.assertEqual(self.run_plan()["skipped"], 0)
+
+    def test_what_needs_one_machine_is_refused(self):
+        bare = self.here / "bare.xyz"
+        bare.write_text("".join(f"{x} {y} {x * y % 3}\n" for x in range(20) for y in range(20)))
+        for arguments, said in (([self.mesh], "build the meshes to a container first"), ([bare], "normals and radii"),
+                                (["-"], "standard input"), ([self.scene, "--city", "5k"], "excludes"), ([], "--city")):
+            message = self.fail_with(2, "ptcfarm", "plan", *arguments, "-o", self.here / "o.json")
+            self.assertIn(said, message)
+        self.assertIn("--output is required", self.fail_with(2, "ptcfarm", "plan", self.scene))
+        self.assertIn("takes one plan", self.fail_with(2, "ptcfarm", "run"))
+        self.assertIn("needs a value", self.fail_with(2, "ptcfarm", "plan", self.scene, "-o"))
+
+    def test_a_cap_below_that_of_a_task_is_refused(self):
+        self.plan("--city", "30k")
+        self.assertIn("268435456", self.fail_with(5, "ptcfarm", "run", self.here / "farm.json", "--memory", "100M"))
+
+
+if __name__ == "__main__":
+    unittest.main()

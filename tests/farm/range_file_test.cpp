@@ -1,0 +1,154 @@
+// Files of points by range: what goes in comes out in order, and damage is found.
+#include "engine/pipeline/farm/range_file.h"
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+
+#include <catch2/catch.hpp>
+
+#include "engine/base/error.h"
+#include "engine/sort/record_values.h"
+#include "tests/support/scenes.h"
+
+using namespace ptc;
+using namespace ptc::test;
+
+namespace {
+
+constexpr std::uint64_t kPlan = 77;
+const RangeRow kRow{.group_bytes = {3, 24}};
+
+struct Points {
+  std::vector<PointRecord> records;
+  std::vector<std::vector<PointRecord>> values;
+};
+
+Points some_points(std::size_t count) {
+  Points points{sort_scene(random_surfels(count, 8)).records, {}};
+  std::ranges::stable_sort(points.records, {}, [](const PointRecord& p) { return p.radius; });
+  for (const std::size_t bytes : kRow.group_bytes) {
+    std::vector<PointRecord>& values = points.values.emplace_back(points.records);
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < bytes; ++k)
+        values_of(values[i])[k] = static_cast<std::byte>(i * 7 + k * 31 + bytes);
+    }
+  }
+  return points;
+}
+
+void write(const std::filesystem::path& path, const Points& points,
+           const std::vector<MortonKey>& cuts) {
+  RangeWriter writer(path, kPlan, cuts, kRow, RangeWriter::least_memory(cuts.size() + 1, kRow));
+  for (std::size_t at = 0; at < points.records.size(); at += 100) {
+    const std::size_t count = std::min<std::size_t>(100, points.records.size() - at);
+    std::vector<std::vector<PointRecord>> values;
+    for (const auto& all : points.values) {
+      const auto begin = all.begin() + static_cast<std::ptrdiff_t>(at);
+      values.emplace_back(begin, begin + static_cast<std::ptrdiff_t>(count));
+    }
+    writer.add(std::span(points.records).subspan(at, count), values);
+  }
+  writer.finish();
+}
+
+std::vector<MortonKey> cuts_of(const Points& points, std::size_t parts) {
+  std::vector<MortonKey> keys, cuts;
+  for (const PointRecord& point : points.records) keys.push_back(point.key);
+  std::ranges::sort(keys);
+  for (std::size_t i = 1; i < parts; ++i) cuts.push_back(keys[i * keys.size() / parts]);
+  return cuts;
+}
+
+}  // namespace
+
+TEST_CASE("range file: the points of each range come in the order of the input",
+          "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  const Points points = some_points(5'000);
+  const std::vector<MortonKey> cuts = cuts_of(points, 5);
+  write(dir / "route", points, cuts);
+  RangeReader reader(dir / "route", kPlan, kRow);
+  std::size_t all = 0;
+  for (std::uint32_t range = 0; range < 5; ++range) {
+    std::vector<std::size_t> wanted;
+    for (std::size_t i = 0; i < points.records.size(); ++i) {
+      if (std::ranges::upper_bound(cuts, points.records[i].key) - cuts.begin() == range)
+        wanted.push_back(i);
+    }
+    CHECK(reader.points(range) == wanted.size());
+    reader.open(range);
+    std::size_t at = 0;
+    std::vector<PointRecord> values;
+    while (reader.next()) {
+      const auto block = reader.block();
+      for (std::size_t i = 0; i < block.size(); ++i)
+        REQUIRE(std::memcmp(&block[i], &points.records[wanted.at(at + i)], sizeof block[i]) == 0);
+      for (std::size_t group = 0; group < kRow.group_bytes.size(); ++group) {
+        reader.values(group, values);
+        for (std::size_t i = 0; i < block.size(); ++i) {
+          PointRecord expected = points.values[group][wanted.at(at + i)];
+          REQUIRE(values[i].key == expected.key);
+          REQUIRE(std::memcmp(values_of(values[i]), values_of(expected), kRow.group_bytes[group]) ==
+                  0);
+        }
+      }
+      at += block.size();
+    }
+    CHECK(at == wanted.size());
+    all += at;
+  }
+  CHECK(all == points.records.size());
+}
+
+TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refused by name",
+          "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  const Points points = some_points(700);
+  write(dir / "route", points, cuts_of(points, 2));
+  const std::vector<char> whole = bytes_of(dir / "route");
+  const auto read = [&] {
+    RangeReader reader(dir / "route", kPlan, kRow);
+    std::size_t count = 0;
+    for (std::uint32_t range = 0; range < 2; ++range) {
+      reader.open(range);
+      while (reader.next()) count += reader.block().size();
+    }
+    return count;
+  };
+  const auto change = [&](const std::vector<char>& bytes) {
+    std::ofstream(dir / "route", std::ios::binary).write(bytes.data(), std::ssize(bytes));
+  };
+  REQUIRE(read() == 700);
+  std::size_t refused = 0;
+  for (std::size_t at = 0; at < whole.size(); at += 61) {
+    std::vector<char> bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 4);
+    change(bytes);
+    try {
+      const std::size_t count = read();  // a byte between blocks
+      REQUIRE(count == 700);
+    } catch (const DataError& error) {
+      REQUIRE_THAT(error.what(), Catch::Contains((dir / "route").string()));
+      ++refused;
+    }
+  }
+  CHECK(refused > 700 * kRow.bytes() / 61);
+  for (std::size_t length = 0; length < whole.size(); length += 997) {
+    change({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)});
+    CHECK_THROWS_AS(read(), DataError);
+  }
+  change(whole);
+  CHECK_THROWS_WITH(RangeReader(dir / "route", kPlan + 1, kRow),
+                    Catch::Contains("of another plan"));
+}
+
+TEST_CASE("range file: a writer that does not finish leaves nothing", "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  {
+    RangeWriter writer(dir / "route", kPlan, {}, kRow, 1 << 20);
+    const Points points = some_points(50);
+    writer.add(points.records, points.values);
+  }
+  CHECK(std::filesystem::is_empty(dir.path()));
+}

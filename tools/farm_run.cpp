@@ -1,0 +1,172 @@
+#include "tools/farm_run.h"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+#include <system_error>
+#include <thread>
+
+#include <fmt/format.h>
+#include <spawn.h>
+
+#include "engine/base/error.h"
+#include "engine/pipeline/farm/tasks.h"
+#include "tools/common.h"
+
+extern char**
+    environ;  // NOLINT(readability-redundant-declaration): not every C library declares it
+
+namespace ptc {
+namespace {
+
+/// The processes of a run.
+class Runner {
+ public:
+  Runner(const FarmPlan& plan, const RunOptions& run, Progress& progress)
+      : plan_(plan),
+        memory_bytes_(run.memory_bytes),
+        cores_(run.threads > 0 ? run.threads : std::max(1U, std::thread::hardware_concurrency())),
+        progress_(progress) {
+    for (const FarmTask& task : plan.tasks) {
+      if (task.memory_bytes > memory_bytes_) {
+        throw LimitError(fmt::format("{} takes up to {} bytes: the least cap is {}", task.name(),
+                                     task.memory_bytes, task.memory_bytes));
+      }
+    }
+  }
+
+  FarmRun run() {
+    std::filesystem::create_directories(plan_.folder() / "log");
+    progress_.begin("run", plan_.tasks.size(), "tasks");
+    for (const FarmTask& task : plan_.tasks) {
+      if (state_of(plan_, task) != TaskState::done) {
+        waiting_.push_back(&task);
+        continue;
+      }
+      done_.insert(task.name());
+      ++result_.skipped;
+      progress_.advance(1);
+    }
+    while (start_ready() || !running_.empty()) await_one();
+    progress_.end();
+    return std::move(result_);
+  }
+
+ private:
+  /// Starts all tasks that may run and fit. @return whether one was started
+  bool start_ready() {
+    if (!result_.failed.empty()) return false;
+    bool started = false;
+    for (auto at = waiting_.begin(); at != waiting_.end();) {
+      const FarmTask& task = **at;
+      const bool ready =
+          std::ranges::all_of(task.after, [&](const auto& name) { return done_.contains(name); });
+      if (!ready || running_.size() >= cores_ || used_bytes_ + task.memory_bytes > memory_bytes_) {
+        ++at;
+        continue;
+      }
+      start(task);
+      at = waiting_.erase(at);
+      started = true;
+    }
+    return started;
+  }
+
+  /// Returns how many of the tasks that may run now run beside each other.
+  [[nodiscard]] unsigned at_once(const FarmTask& task) const {
+    const auto same =
+        static_cast<std::uint64_t>(std::ranges::count(plan_.tasks, task.kind, &FarmTask::kind));
+    const std::uint64_t fit =
+        std::max<std::uint64_t>(memory_bytes_ / std::max<std::uint64_t>(task.memory_bytes, 1), 1);
+    return static_cast<unsigned>(std::min<std::uint64_t>({same, fit, cores_}));
+  }
+
+  [[nodiscard]] std::filesystem::path log_of(const FarmTask& task) const {
+    return plan_.folder() / "log" / task.name();
+  }
+
+  void start(const FarmTask& task) {
+    // Complete its command line
+    std::vector<std::string> words = task.command;
+    words[0] = std::filesystem::read_symlink("/proc/self/exe").string();
+    words.insert(words.end(),
+                 {"--threads", std::to_string(std::max(1U, cores_ / at_once(task))), "--quiet"});
+    std::vector<char*> arguments;
+    for (std::string& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+
+    // Start it with its messages in a file
+    const std::string log = log_of(task).string();
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0666);
+    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
+    pid_t child = 0;
+    const int error =
+        posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&actions);
+    if (error != 0) throw std::system_error(error, std::generic_category(), words[0]);
+    running_[child] = &task;
+    used_bytes_ += task.memory_bytes;
+  }
+
+  void await_one() {
+    int status = 0;
+    pid_t child = 0;
+    do child = waitpid(-1, &status, 0);
+    while (child < 0 && errno == EINTR);
+    if (child < 0) throw std::system_error(errno, std::generic_category(), "waitpid");
+    const auto found = running_.find(child);
+    if (found == running_.end()) return;
+    const FarmTask& task = *found->second;
+    running_.erase(found);
+    used_bytes_ -= task.memory_bytes;
+    progress_.advance(1);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+      done_.insert(task.name());
+      ++result_.ran;
+    } else {
+      fail(task, status);
+    }
+  }
+
+  void fail(const FarmTask& task, int status) {
+    std::ifstream log(log_of(task));
+    std::stringstream text;
+    text << log.rdbuf();
+    if (WIFSIGNALED(status))
+      text << fmt::format("{}: it was ended by signal {}\n", task.name(), WTERMSIG(status));
+    note_failure(plan_, task, text.str());
+    result_.failed.push_back(task.name());
+    result_.errors += fmt::format("{} failed:\n{}", task.name(), text.str());
+    if (result_.exit_code == 0)
+      result_.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : static_cast<int>(kSystem);
+  }
+
+  const FarmPlan& plan_;
+  std::uint64_t memory_bytes_;
+  unsigned cores_;
+  Progress& progress_;
+  std::vector<const FarmTask*> waiting_;
+  std::map<pid_t, const FarmTask*> running_;
+  std::set<std::string> done_;
+  std::uint64_t used_bytes_ = 0;
+  FarmRun result_;
+};
+
+}  // namespace
+
+FarmRun run_plan(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
+  return Runner(plan, run, progress).run();
+}
+
+}  // namespace ptc

@@ -1,0 +1,317 @@
+// ptcfarm: builds one scene by many tasks, on one machine or on many.
+//
+//   plan      inputs --> plan.json
+//   route, part, join    one task of a plan
+//   run       all tasks, on this machine
+//   status    how far they are
+//   export    the tasks for another scheduler
+#include <algorithm>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "engine/io/file/file.h"
+#include "engine/pipeline/farm/plan.h"
+#include "engine/pipeline/farm/tasks.h"
+#include "format/node_page.h"
+#include "format/text.h"
+#include "tools/common.h"
+#include "tools/farm_export.h"
+#include "tools/farm_run.h"
+#include "tools/inputs.h"
+#include "tools/options.h"
+#include "tools/report.h"
+#include "tools/values.h"
+
+namespace {
+
+constexpr char kPurpose[] =
+    "Builds one container by many tasks, on one machine or on many.\n"
+    "A plan says what is built, where its points are cut into parts, and by which tasks. Each task "
+    "is one command line: route sends the points of an input to the parts that they belong to, "
+    "part "
+    "sorts and builds the points of one part, join writes the scene file over all parts. A task "
+    "that is done does nothing when it is run again, and what a task writes appears whole or not "
+    "at all.\n"
+    "\n"
+    "The scene refers to its parts, which stay files of their own. Its tree, and all that is "
+    "shaded "
+    "from it, has the bits of a container that one machine builds of the same inputs.\n"
+    "\n"
+    "Inputs are clouds and containers whose points have normals and radii, and keep the light that "
+    "they have. Build meshes, and clouds that lack something, to a container first.";
+constexpr char kExamples[] =
+    "  # Plan a scene of eight parts, and run the tasks on this machine\n"
+    "  ptcfarm plan tiles/*.ptcx --parts 8 -o town.json\n"
+    "  ptcfarm run town.json --memory 8G\n"
+    "  # Run one task, as a farm does\n"
+    "  ptcfarm part town.json --number 3\n"
+    "  # Submit the tasks to Slurm\n"
+    "  ptcfarm export town.json --for slurm -o town.sh\n"
+    "  # See how far the tasks are, and what failed\n"
+    "  ptcfarm status town.json\n";
+
+enum class Action { plan, run, status, export_tasks, route, part, join };
+
+struct Arguments {
+  Action action = Action::plan;
+  std::vector<std::filesystem::path> files;
+  std::filesystem::path output, scene;
+  ptc::BuildRequest request;
+  ptc::FarmOptions farm;
+  std::size_t number = 0;
+  ptc::Scheduler scheduler = ptc::Scheduler::parallel;
+};
+
+void declare(ptc::Command& command, Arguments& arguments) {
+  CLI::App& app = command.app();
+  ptc::BuildRequest& request = arguments.request;
+  ptc::add_choice<Action>(app, "ACTION", arguments.action,
+                          {{"plan", Action::plan},
+                           {"run", Action::run},
+                           {"status", Action::status},
+                           {"export", Action::export_tasks},
+                           {"route", Action::route},
+                           {"part", Action::part},
+                           {"join", Action::join}},
+                          "plan, run, status, export, or the kind of a task\n"
+                          "plan measures the inputs and writes a plan. run runs its tasks, those "
+                          "that are done left out. status says how far they are. export writes "
+                          "them for another scheduler. route, part and join run one task.")
+      ->required()
+      ->type_name("ACTION")
+      ->default_str("")
+      ->group(ptc::kFilesGroup);
+  ptc::offer(app.add_option("FILE", arguments.files,
+                            "Inputs of a plan, as ptcbuild takes them; else the plan"),
+             {".json", ".ptcx", ".ply", ".las", ".laz", ".e57"})
+      ->type_name("FILE")
+      ->group(ptc::kFilesGroup);
+  command
+      .add_output("-o,--output", arguments.output, {".json", ".sh"},
+                  "Plan (.json), or tasks for another scheduler, to write")
+      ->required(false);
+  command
+      .add_output("--scene", arguments.scene, {".ptcx"},
+                  "Scene that the tasks will write [default: the name of the plan, .ptcx]\n"
+                  "Its parts go into a folder beside it, NAME.parts.")
+      ->required(false);
+  ptc::add_count(app, "--city", request.city_points,
+                 "Plan a procedural city of about COUNT points instead of inputs")
+      ->group(ptc::kFilesGroup);
+  app.add_flag("--remove-duplicates", request.remove_duplicates,
+               "Keep one of the points that lie at the same place")
+      ->group(ptc::kFilesGroup);
+  ptc::add_up(app, request.up)->group(ptc::kFilesGroup);
+  ptc::add_original_order(app, request.original_order, "Record the order of the inputs")
+      ->group(ptc::kFilesGroup);
+}
+
+void declare_tasks(CLI::App& app, Arguments& arguments) {
+  constexpr char kGroup[] = "Tasks";
+  ptc::add_integer(app, "--parts", arguments.farm.parts, 0, 10'000,
+                   "Parts to plan; 0: as many as memory needs\n"
+                   "The points of each part then fit in half of the memory of a task.")
+      ->group(kGroup);
+  ptc::add_size(app, "--task-memory", arguments.farm.memory_bytes,
+                "Cap on the memory of each planned task")
+      ->group(kGroup);
+  ptc::add_choice<ptc::Scheduler>(app, "--for", arguments.scheduler,
+                                  {{"parallel", ptc::Scheduler::parallel},
+                                   {"slurm", ptc::Scheduler::slurm},
+                                   {"openjd", ptc::Scheduler::openjd}},
+                                  "Scheduler to export for: parallel, slurm or openjd\n"
+                                  "parallel and slurm are shell scripts: one calls GNU parallel, "
+                                  "one submits jobs to Slurm. openjd is a job template of Open Job "
+                                  "Description, which other farms take.")
+      ->group(kGroup);
+  ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
+                   "Number of the task among those of its kind")
+      ->group(kGroup);
+}
+
+void declare_container(CLI::App& app, ptc::BuildRequest& request) {
+  ptc::add_profile(app, request.profile)->group("Container");
+  ptc::add_page_size(app, request.page_shift)->group("Container");
+  ptc::add_integer(app, "--leaf", request.tree.leaf_points, 1, ptc::kMaxLeafPoints,
+                   "Maximum number of points in a leaf of the octree")
+      ->group("Container");
+}
+
+nlohmann::ordered_json facts_of(const ptc::FarmPlan& plan) {
+  return {{"plan", plan.file.string()},
+          {"scene", plan.scene.string()},
+          {"points", plan.points},
+          {"parts", plan.parts()},
+          {"tasks", plan.tasks.size()}};
+}
+
+/// The command line of a task. The cap is that of the plan.
+std::vector<std::string> command_of(const ptc::FarmPlan& plan, const ptc::FarmTask& task) {
+  return {"ptcfarm",
+          ptc::name_of(task.kind),
+          plan.file.string(),
+          "--number",
+          std::to_string(task.number),
+          "--memory",
+          std::to_string(task.memory_bytes)};
+}
+
+ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
+  if (arguments.output.empty()) throw CLI::RequiredError("--output");
+  if (!ptc::has_ending(arguments.output, ".json"))
+    throw CLI::ValidationError("--output", "the name of a plan must end in .json");
+  ptc::BuildRequest& request = arguments.request;
+  if (arguments.files.empty() && request.city_points == 0)
+    throw CLI::RequiredError("FILE or --city");
+  if (std::ranges::find(arguments.files, "-") != arguments.files.end())
+    throw CLI::ValidationError("FILE", "tasks cannot read standard input");
+  request.run = command.run_options();
+  const ptc::InputFiles inputs(arguments.files, "", request.run, arguments.output);
+  request.inputs = inputs.paths();
+  request.input_names = inputs.names();
+  std::filesystem::path scene = arguments.scene;
+  if (scene.empty()) scene = std::filesystem::path(arguments.output).replace_extension(".ptcx");
+  arguments.farm.command = command_of;
+  ptc::FarmPlan plan = ptc::make_plan(request, scene, arguments.output, arguments.farm, progress);
+  ptc::write_plan(plan);
+  return {facts_of(plan),
+          fmt::format("{}: {} points, {} parts, {} tasks\n", arguments.output.string(), plan.points,
+                      plan.parts(), plan.tasks.size())};
+}
+
+/// Reads the plan of an action that takes nothing else.
+ptc::FarmPlan only_plan(const Arguments& arguments) {
+  if (arguments.files.size() != 1) throw CLI::ValidationError("FILE", "takes one plan");
+  ptc::check_input(arguments.files[0]);
+  return ptc::read_plan(arguments.files[0]);
+}
+
+ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
+  const ptc::FarmPlan plan = only_plan(arguments);
+  const ptc::FarmRun done = ptc::run_plan(plan, command.run_options(), progress);
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["ran"] = done.ran;
+  outcome.facts["skipped"] = done.skipped;
+  outcome.facts["failed"] = done.failed;
+  outcome.exit_code = static_cast<ptc::ExitCode>(done.exit_code);
+  outcome.summary = done.failed.empty() ? fmt::format("{}: {} tasks ran, {} were done before\n",
+                                                      plan.scene.string(), done.ran, done.skipped)
+                                        : done.errors;
+  return outcome;
+}
+
+ptc::Outcome run_one(const Arguments& arguments, ptc::TaskKind kind, ptc::Command& command,
+                     ptc::Progress& progress) {
+  const ptc::FarmPlan plan = only_plan(arguments);
+  const auto task = std::ranges::find_if(plan.tasks, [&](const ptc::FarmTask& other) {
+    return other.kind == kind && other.number == arguments.number;
+  });
+  if (task == plan.tasks.end()) {
+    throw CLI::ValidationError("--number", fmt::format("the plan has no task {}.{}",
+                                                       ptc::name_of(kind), arguments.number));
+  }
+  const bool ran = ptc::run_task(plan, *task, command.run_options(), progress);
+  return {{{"plan", plan.file.string()}, {"task", task->name()}, {"ran", ran}},
+          fmt::format("{}: {}\n", task->name(), ran ? "done" : "was done before")};
+}
+
+const char* name_of(ptc::TaskState state) {
+  switch (state) {
+    case ptc::TaskState::waiting:
+      return "waiting";
+    case ptc::TaskState::failed:
+      return "failed";
+    case ptc::TaskState::done:
+      break;
+  }
+  return "done";
+}
+
+/// A bar of the share that is done: "[#####.....]".
+std::string bar(double share) {
+  constexpr std::size_t kWidth = 30;
+  const auto full = static_cast<std::size_t>(share * kWidth);
+  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
+}
+
+ptc::Outcome status(const Arguments& arguments) {
+  const ptc::FarmPlan plan = only_plan(arguments);
+  std::size_t done = 0, failed = 0;
+  double seconds = 0, left = 0;
+  std::string failures;
+  nlohmann::ordered_json tasks = nlohmann::ordered_json::array();
+  for (const ptc::FarmTask& task : plan.tasks) {
+    const ptc::TaskState state = ptc::state_of(plan, task);
+    const std::string failure =
+        state == ptc::TaskState::failed ? ptc::failure_of(plan, task) : std::string();
+    done += state == ptc::TaskState::done ? 1 : 0;
+    failed += state == ptc::TaskState::failed ? 1 : 0;
+    seconds += task.seconds;
+    left += state == ptc::TaskState::done ? 0 : task.seconds;
+    tasks.push_back({{"name", task.name()}, {"state", name_of(state)}});
+    if (state != ptc::TaskState::failed) continue;
+    tasks.back()["error"] = failure;
+    failures +=
+        fmt::format("{} failed:\n{}{}", task.name(), failure, failure.ends_with('\n') ? "" : "\n");
+  }
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["done"] = done;
+  outcome.facts["failed"] = failed;
+  outcome.facts["core_seconds_left"] = left;
+  outcome.facts["states"] = tasks;
+  const double share = seconds > 0 ? (seconds - left) / seconds : 1;
+  outcome.summary = fmt::format(
+      "{} {:.0f} %, {} of {} tasks done, {} failed, about {:.0f} s of "
+      "one core left\n{}",
+      bar(share), 100 * share, done, plan.tasks.size(), failed, left, failures);
+  return outcome;
+}
+
+ptc::Outcome export_tasks(const Arguments& arguments) {
+  if (arguments.output.empty()) throw CLI::RequiredError("--output");
+  const ptc::FarmPlan plan = only_plan(arguments);
+  if (ptc::same_name(arguments.output, plan.file))
+    throw CLI::ValidationError("--output", "it is the plan itself");
+  const std::string text = ptc::exported(plan, arguments.scheduler);
+  ptc::OutputFile file(arguments.output);
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["output"] = arguments.output.string();
+  outcome.summary = fmt::format("{}: {} tasks\n", arguments.output.string(), plan.tasks.size());
+  return outcome;
+}
+
+ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
+  switch (arguments.action) {
+    case Action::plan:
+      return plan(arguments, command, progress);
+    case Action::run:
+      return run(arguments, command, progress);
+    case Action::status:
+      return status(arguments);
+    case Action::export_tasks:
+      return export_tasks(arguments);
+    case Action::route:
+      return run_one(arguments, ptc::TaskKind::route, command, progress);
+    case Action::part:
+      return run_one(arguments, ptc::TaskKind::part, command, progress);
+    case Action::join:
+      break;
+  }
+  return run_one(arguments, ptc::TaskKind::join, command, progress);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ptc::Command command("ptcfarm", kPurpose, kExamples);
+  Arguments arguments;
+  declare(command, arguments);
+  ptc::add_selection(command.app(), arguments.request.selection);
+  declare_tasks(command.app(), arguments);
+  declare_container(command.app(), arguments.request);
+  return command.run(argc, argv,
+                     [&](ptc::Progress& progress) { return act(arguments, command, progress); });
+}
