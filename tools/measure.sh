@@ -89,6 +89,7 @@ measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M 
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
 measure hunt hunt -- --scenes 20
 measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
+measure knob knob -- cornell --points 2k --checked 64 --check-rays 256 --seeds 1 --set points
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
 measure mutations mutations -- --every 10007

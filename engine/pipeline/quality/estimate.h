@@ -45,8 +45,8 @@ struct ErrorSample {
 };
 
 /// Fits a line to samples by least squares, with neither coefficient negative. The weighted mean of
-/// the line over the samples is that of their errors. Both coefficients are 0 when there are no samples
-/// or that mean is not positive.
+/// the line over the samples is that of their errors. Both coefficients are 0 when there are no
+/// samples or that mean is not positive.
 [[nodiscard]] ErrorLine fit_errors(std::span<const ErrorSample> samples);
 
 /// The basis and the cost of the estimates of a run.

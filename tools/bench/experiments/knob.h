@@ -21,7 +21,7 @@ struct KnobOptions {
   SceneOptions scene;
   std::vector<double> asked{0.05, 0.03};  ///< errors asked, shares
   unsigned seeds = 20;                    ///< choices of pilots
-  unsigned checked = 4096;                ///< receivers at which errors are measured, about
+  unsigned checked = 2048;                ///< receivers at which errors are measured, about
   unsigned rays = 4096;                   ///< rays for each of those receivers
   std::vector<std::string> sets{kSets.begin(), kSets.end()};  ///< of kSets, those that are shaded
 };

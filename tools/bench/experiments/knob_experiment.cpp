@@ -109,10 +109,10 @@ Experiment make_knob_experiment() {
   const auto options = std::make_shared<KnobOptions>();
   const auto scenes = std::make_shared<SceneList>(
       std::vector<std::string>{"fractal", "window", "city", "cornell", "box-lamp"});
-  options->scene.points = 200'000;
+  options->scene.points = 100'000;
   const auto declare = [=](Declaration& d) {
     d.scenes(*scenes);
-    d.points(options->scene.points, "200k", 50'000);
+    d.points(options->scene.points, "100k", 50'000);
     d.checked(options->checked, 1024);
     d.integer("--seeds", options->seeds, 1, 1000, "Choices of pilots for each error asked");
     d.quick("--seeds", options->seeds, 4);
