@@ -410,7 +410,7 @@ TEST_CASE("gather: receivers of weight 0 have their part in cells, and take no w
   CHECK(part.work().receivers == Approx(n).epsilon(0.02));
   CHECK(part.work().clusters == Approx(whole.counts().clusters).epsilon(0.1));
   CHECK(part.work().surfel_blocks == Approx(whole.counts().surfel_blocks).epsilon(0.1));
-  CHECK(whole.work().receivers == 0);
+  CHECK(whole.work().receivers == 0);  // it had no weights
   Gather each(view, cache, {});
   each.shade(scene.receivers, some, grid, std::vector<float>(n, 1));
   CHECK(each.work().clusters == Approx(whole.counts().clusters).epsilon(1e-6));

@@ -182,14 +182,15 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
 
 void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse) {
   ReceiverPlaces compared;
-  std::vector<Receiver> pilots_compared;
+  std::vector<Pilot> pilots;
   if (sparse && !request_.error && has_usual_settings(request_.gather)) {
     options_.gather.solid_angle = kSparseSolidAngle;
     options_.gather.parallax = kSparseParallax;
     options_.gather.resolution = kSparseResolution;
   }
   if (request_.error || request_.estimate) {
-    std::vector<Pilot> pilots = find_pilots();
+    pilots = find_pilots();
+    return_freed_memory();
     std::vector<Shading> traced;  // two results by rays for each compared receiver
 
     // Choose the settings
@@ -200,11 +201,10 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
       const Surroundings around = options_.gather.around;
       const bool by_rays = around.is_plain() && !has_sky_map_ && !request_.estimate;
       report_.tuning = ptc::tune(lit(), options_, *request_.error, by_rays, pilots, executor_,
-                                 progress_, compared, traced);
+                                 progress_, traced);
       options_.gather = report_.tuning->gather;
       options_.gather.around = around;
     }
-    pilots_compared = compared_of(pilots);
 
     // Fit the estimates; tune() has traced the pilots already
     if (request_.estimate) {
@@ -218,6 +218,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     }
   }
 
+  if (!request_.glossy.roughness) pilots.clear();
   return_freed_memory();  // that pilots took: what comes next takes it again
   report_.settings = options_.gather;
 
@@ -241,7 +242,7 @@ void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool
     rays_ = std::make_unique<RayShader>(lit(), with, executor_);
   if (request_.glossy.roughness && request_.error && request_.glossy.rays == 0) {
     const Stage stage(report_.seconds, progress_, "tune reflections", 0, "receivers");
-    report_.mirrors = tune_mirrors(*rays_, pilots_compared, mirrors_, *request_.error);
+    report_.mirrors = tune_mirrors(*rays_, pilots, mirrors_, *request_.error);
     mirrors_.rays = report_.mirrors->rays;
   }
 }

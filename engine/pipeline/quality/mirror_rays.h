@@ -4,6 +4,7 @@
 #include <span>
 
 #include "engine/pipeline/quality/check_error.h"
+#include "engine/pipeline/quality/pilots.h"
 #include "engine/shade/shading.h"
 #include "engine/trace/ray_shader.h"
 
@@ -28,10 +29,10 @@ struct MirrorTuning {
 
 /// Doubles the number of rays until two independent results of each receiver differ by no more than
 /// the error that is asked for. The result depends on neither threads nor memory cap.
-/// @param receivers  those that stand for the run
+/// @param pilots     whose compared receivers stand for the run
 /// @param mirrors    its `rays` are not used
 /// @param asked      relative error, above 0
-[[nodiscard]] MirrorTuning tune_mirrors(RayShader& shader, std::span<const Receiver> receivers,
+[[nodiscard]] MirrorTuning tune_mirrors(RayShader& shader, std::span<const Pilot> pilots,
                                         Mirrors mirrors, double asked);
 
 }  // namespace ptc

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include <glm/geometric.hpp>
 
@@ -44,7 +45,9 @@ double noise_of(std::span<const Pilot> pilots, std::span<const Shading> traced) 
 
 /// Returns the noise of each receiver. Two results tell little of it, so that it is averaged with
 /// those of its pilot and of all.
-std::vector<Noisy> noise_of_each(std::span<const Pilot> pilots, std::span<const Shading> traced) {
+/// @param noise  of a result in the mean of all receivers
+std::vector<Noisy> noise_of_each(std::span<const Pilot> pilots, std::span<const Shading> traced,
+                                 double noise) {
   const CheckError means = sums_of(pilots, traced).error();
   const auto over = [](double square, double mean) {
     return mean > 0 ? square / (mean * mean) : 0.0;
@@ -62,12 +65,18 @@ std::vector<Noisy> noise_of_each(std::span<const Pilot> pilots, std::span<const 
       sum += one.weight * all.back().square;
     }
   }
+  // What the noise is told by may be the light of the sky, of which occlusion tells the shares
+  const double scale = sum > 0 ? noise * noise * weights / sum : 0;
   std::size_t first = 0;
   for (const Pilot& pilot : pilots) {
     const auto own = std::span(all).subspan(first, pilot.compared.size());
-    double own_sum = 0;
-    for (const Noisy& one : own) own_sum += one.square / static_cast<double>(own.size());
-    for (Noisy& one : own) one.square = (one.square + own_sum + sum / weights) / 3;
+    double own_weights = 0, own_sum = 0;
+    for (const Noisy& one : own) {
+      own_weights += one.weight;
+      own_sum += one.weight * one.square;
+    }
+    for (Noisy& one : own)
+      one.square = scale * (one.square + own_sum / own_weights + sum / weights) / 3;
     first += own.size();
   }
   return all;
@@ -89,7 +98,8 @@ std::vector<unsigned> share_rays(std::span<const Noisy> receivers, double asked)
   std::vector<unsigned> rays;
   for (const Noisy& one : receivers) {
     const double wanted = std::clamp<double>(scale * shape(one), kFirst, kMost);
-    rays.push_back(std::bit_ceil(static_cast<unsigned>(wanted)));  // few numbers: traced together
+    // To the nearest power of 2: few numbers are traced together
+    rays.push_back(std::bit_ceil(static_cast<unsigned>(wanted / std::numbers::sqrt2)));
   }
   return rays;
 }
@@ -113,17 +123,20 @@ PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& 
 PilotRays trace_for(std::span<const Pilot> pilots, double asked, RayShader& discs,
                     Progress& progress) {
   PilotRays result = trace_evenly(pilots, kFirst, discs, progress);
-  if (noise_of(pilots, result.traced) <= asked) return result;
+  const double noise = noise_of(pilots, result.traced);
+  if (noise <= asked) return result;
   // All anew: those that seem to have little noise may have met it by chance
-  const std::vector<unsigned> rays = share_rays(noise_of_each(pilots, result.traced), asked);
+  const std::vector<unsigned> rays = share_rays(noise_of_each(pilots, result.traced, noise), asked);
   std::map<unsigned, std::vector<std::size_t>> groups;
   for (std::size_t i = 0; i < rays.size(); ++i) groups[rays[i]].push_back(i);
   result.rays = 0;
+  std::uint64_t seed = kSecondSeed;
   for (const auto& [count, members] : groups) {
     std::vector<Receiver> some;
     for (const std::size_t i : members) some.insert(some.end(), 2, result.compared[i]);
     std::vector<Shading> traced(some.size());
-    discs.trace(some, count, kSecondSeed + 2 * members.front(), traced, progress);
+    discs.trace(some, count, seed, traced, progress);
+    seed += some.size();
     for (std::size_t k = 0; k < members.size(); ++k) {
       result.traced[2 * members[k]] = traced[2 * k];
       result.traced[2 * members[k] + 1] = traced[2 * k + 1];

@@ -18,15 +18,15 @@ struct PilotRays {
   std::vector<Receiver> compared;
   std::vector<Shading> traced;  ///< twice as many
   double rays = 0;              ///< of a result, in the mean
-  /// How many rays of a receiver have a noise of 1 as CheckError::relative_noise(), as the noise of
-  /// n rays falls as n^-0.6.
+  /// Number of rays of each receiver at which CheckError::relative_noise() is 1, as the noise of n
+  /// rays falls as n^-0.6.
   double rays_of_noise_1 = 0;
 
-  /// Returns how many rays have a noise, about.
+  /// Estimates how many rays of each receiver have this noise.
   [[nodiscard]] double rays_for(double noise) const;
 };
 
-/// Traces as many rays at all receivers.
+/// Traces the same number of rays at every receiver.
 /// @param rays  for each of the two results of a receiver
 [[nodiscard]] PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& discs,
                                      Progress& progress);

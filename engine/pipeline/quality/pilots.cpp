@@ -6,7 +6,6 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kMaxBlocks = 128;      // whose receivers are in memory at once
-constexpr std::size_t kEnoughPilots = 64;    // blocks are cut into stretches below that
 constexpr std::size_t kLeastReceivers = 16;  // of a stretch: a small run has fewer pilots instead
 
 /// Returns the place of the k-th of some receivers that are evenly spread over a stretch.
@@ -61,12 +60,13 @@ std::vector<Receiver> compared_of(std::span<const Pilot> pilots) {
 }
 
 std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot, std::span<const Compared> some,
-                                const DirectionGrid& grid) {
+                                const DirectionGrid& grid, GatherWork& work) {
   const std::vector<Receiver>& block = *pilot.block;
   std::vector<float> weights(block.size());
   for (const Compared& one : some) weights[one.at] = static_cast<float>(one.weight);
   std::vector<Shading> all(block.size()), results;
   gather.shade(block, all, grid, weights);
+  work = gather.work();
   for (const Compared& one : some) results.push_back(all[one.at]);
   return results;
 }

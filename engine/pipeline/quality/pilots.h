@@ -6,7 +6,8 @@
 //   compared with rays              '   '                     '                        8 of them
 //
 // A pilot knows the whole block that the run shades at once, so that its receivers get the results
-// that they get in the run, whatever they share with others there.
+// that they get in the run, whatever they share with others there. (The sky through small openings
+// is looked for from what the receiver before has found, which is another one here.)
 #pragma once
 
 #include <algorithm>
@@ -48,6 +49,9 @@ struct Pilot {
   [[nodiscard]] std::size_t candidate_at(std::size_t k) const noexcept;
 };
 
+/// The number of pilots below which blocks are cut into stretches.
+inline constexpr std::size_t kEnoughPilots = 64;
+
 /// How many blocks of a run are pilots, and into how many stretches each is cut.
 struct PilotPlan {
   std::size_t blocks = 0;     ///< 0 only for a run without receivers
@@ -59,9 +63,9 @@ struct PilotPlan {
 /// @param block      receivers that it shades at once, at most
 [[nodiscard]] PilotPlan plan_pilots(std::uint64_t receivers, std::size_t block);
 
-/// Cuts a block into pilots. As many receivers are compared in each, evenly spread.
+/// Cuts a block into pilots. Up to 8 receivers of each are compared, evenly spread.
 /// @param block      not empty
-/// @param stretches  at most: none is shorter than 16 receivers, unless the block is
+/// @param stretches  maximum number; fewer where a stretch would be shorter than 16 receivers
 /// @param share      how many receivers of the run one of the block stands for
 /// @param phase      as Pilot::phase
 void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigned variant,
@@ -72,10 +76,11 @@ void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigne
 
 /// Shades some receivers of a pilot's block as the run does.
 /// @param grid  of the pilot's variant
+/// @param work  gets what they take
 /// @return      one result for each of them, in their order
 [[nodiscard]] std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot,
                                               std::span<const Compared> some,
-                                              const DirectionGrid& grid);
+                                              const DirectionGrid& grid, GatherWork& work);
 
 /// A set of receivers; those at the same position count as one.
 class ReceiverPlaces {

@@ -267,17 +267,18 @@ class Tuner {
     }
     std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
     std::vector<std::vector<Shading>> results(pilots.size());
+    std::vector<GatherWork> works(pilots.size());
     executor_.for_each(pilots.size(), [&](std::size_t k, unsigned thread) {
       if (!gathers[thread])
         gathers[thread] = std::make_unique<Gather>(view_, *cache_, gather, visibility);
       const Pilot& pilot = pilots_[pilots[k]];
       results[k] = shade_some(*gathers[thread], pilot, some_of(pilots[k]),
-                              *grids[pilot.variant % grids.size()]);
+                              *grids[pilot.variant % grids.size()], works[k]);
     });
+    // In the order of the pilots: sums of floats must not depend on which thread shades which
+    for (const GatherWork& work : works) works_[rung].add(work);
     for (const auto& done : gathers) {
-      if (!done) continue;
-      works_[rung].add(done->work());
-      shaded_ += done->counts().receivers;
+      if (done) shaded_ += done->counts().receivers;
     }
     return results;
   }
@@ -347,14 +348,13 @@ double ray_cost(unsigned rays) {
 
 TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, double asked,
                   bool by_rays, std::span<Pilot> pilots, const Executor& executor,
-                  Progress& progress, ReceiverPlaces& compared, std::vector<Shading>& traced) {
+                  Progress& progress, std::vector<Shading>& traced) {
   // Choose what is compared, and trace rays there
   Tuner tuner(scene, options, pilots, executor);
   const double start = cpu_seconds();
   tuner.survey(pilots);
   const double before = cpu_seconds();
   tuner.trace([&](RayShader& discs) { return trace_for(pilots, asked, discs, progress); });
-  for (const Receiver& receiver : tuner.rays().compared) compared.add(receiver);
   const double tracing_done = cpu_seconds();
 
   // Choose the setting

@@ -79,15 +79,14 @@ inline constexpr std::uint64_t kRunSeed = std::uint64_t{1} << 40;
 ///                  about count. Its cache_bytes are the cap of the rays too
 /// @param asked     relative error, above 0 and at most 1
 /// @param by_rays   whether rays may shade the receivers
-/// @param pilots    get other receivers that are compared, as many in all
-/// @param compared  gets the receivers of the pilots that were compared
+/// @param pilots    their compared receivers are chosen anew; their number in all stays
 /// @param traced    gets two results by rays for each compared receiver, side by side, pilot by
 ///                  pilot
 /// @throws FormatError when a page is damaged; std::system_error
 [[nodiscard]] TuningReport tune(const ContainerReader& scene, const ShadeOptions& options,
                                 double asked, bool by_rays, std::span<Pilot> pilots,
                                 const Executor& executor, Progress& progress,
-                                ReceiverPlaces& compared, std::vector<Shading>& traced);
+                                std::vector<Shading>& traced);
 
 /// The error and the cost of one setting of the ladder.
 struct RungError {

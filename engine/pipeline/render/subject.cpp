@@ -145,7 +145,7 @@ class Tiles {
   }
 
  private:
-  /// Returns the number next to the golden section of a count that has no divisor with it.
+  /// Returns the number next to the golden section of a count that is coprime to it.
   static std::size_t step_of(std::size_t count) {
     auto step = static_cast<std::size_t>(static_cast<double>(count) / std::numbers::phi) + 1;
     while (std::gcd(step, count) != 1) ++step;
@@ -158,47 +158,79 @@ class Tiles {
   std::size_t count_, step_;
 };
 
-/// Adds pilots of a tile: some of the blocks of some of the samples.
+/// A block of a picture, and how many of its receivers one of the block stands for.
+struct PictureBlock {
+  std::vector<Receiver> receivers;
+  unsigned variant = 0;
+  double share = 1;
+};
+
+/// Adds some of the blocks of some of the samples of a tile.
+/// @param index   of the tile: which samples and blocks these are
 /// @param wanted  number of blocks
-/// @return        how many blocks were found
-std::size_t add_pilots_of(const Subject& subject, const Tile& tile, std::size_t index,
-                          std::size_t wanted, std::size_t stretches, const Frame& frame,
-                          const Executor& executor, std::vector<Pilot>& pilots) {
+void add_blocks_of(const Subject& subject, const Tile& tile, std::size_t index, std::size_t wanted,
+                   const Frame& frame, const Executor& executor,
+                   std::vector<PictureBlock>& blocks) {
   subject.view->look_at(samples_of(tile, subject.side), false);
   const std::size_t samples = std::size_t{subject.side} * subject.side;
   const std::size_t chosen = std::min(samples, wanted), of_each = (wanted + chosen - 1) / chosen;
-  std::size_t found = 0;
   for (std::size_t k = 0; k < chosen; ++k) {
     const auto sample = static_cast<unsigned>((index + k * samples / chosen) % samples);
     const std::vector<Receiver> all = receivers_of(subject, tile, sample, frame, executor);
-    const std::size_t blocks = (all.size() + Shader::kBlock - 1) / Shader::kBlock,
-                      taken = std::min(blocks, of_each);
+    const std::size_t cut = (all.size() + Shader::kBlock - 1) / Shader::kBlock,
+                      taken = std::min(cut, of_each);
+    const std::size_t before = blocks.size();
+    std::size_t receivers = 0;
     for (std::size_t j = 0; j < taken; ++j) {
-      const std::size_t first = (2 * j + 1) * blocks / (2 * taken) * Shader::kBlock;
+      // Another one for each sample
+      const std::size_t place = j * chosen + (k + index) % chosen;
+      const std::size_t first = (2 * place + 1) * cut / (2 * taken * chosen) * Shader::kBlock;
       const auto some = std::span(all).subspan(first, std::min(Shader::kBlock, all.size() - first));
-      const double share =
-          static_cast<double>(blocks * samples) / static_cast<double>(taken * chosen);
-      add_pilots(pilots, {some.begin(), some.end()}, sample % TileRenderer::kMaxVariants, stretches,
-                 share);
+      blocks.push_back({{some.begin(), some.end()}, sample % TileRenderer::kMaxVariants});
+      receivers += some.size();
     }
-    found += taken;
+    for (std::size_t i = before; i < blocks.size(); ++i) {
+      blocks[i].share =
+          static_cast<double>(all.size() * samples) / static_cast<double>(chosen * receivers);
+    }
   }
-  return found;
 }
 
 /// Returns pilots that stand for all receivers of a picture.
-/// @param part  of so many pictures this is one, which have pilots in equal parts
-std::vector<Pilot> pilots_of(const Subject& subject, std::size_t part, const Frame& frame,
-                             const Executor& executor) {
+/// @param number, pictures  of so many pictures this is one; they share the pilots equally
+std::vector<Pilot> pilots_of(const Subject& subject, std::size_t number, std::size_t pictures,
+                             const Frame& frame, const Executor& executor) {
   constexpr std::size_t kTiles = 32;  // that blocks come from, where there are as many
   const Tiles tiles(subject.window, subject.side);
   const PilotPlan plan = plan_pilots(subject.samples(), std::min(Shader::kBlock, tiles.pixels()));
-  const std::size_t blocks = (plan.blocks + part - 1) / part;
-  const std::size_t of_tile =
-      (blocks + std::min(kTiles, tiles.count()) - 1) / std::min(kTiles, tiles.count());
+  const std::size_t wanted = (plan.blocks + pictures - 1) / pictures;
+  const std::size_t spread = std::min(kTiles, tiles.count());
+  // Pictures take one tile after another, and the pilots of every second tile choose the settings
+  std::array<std::vector<PictureBlock>, 2> blocks;
+  std::size_t seen = 0;
+  const auto found = [&] { return blocks[0].size() + blocks[1].size(); };
+  for (; seen < tiles.count() && found() < wanted; ++seen) {
+    const std::size_t index = seen + number * spread;
+    add_blocks_of(subject, tiles[index], index, (wanted + spread - 1) / spread, frame, executor,
+                  blocks[seen % 2]);
+  }
+  // Cut them where they are few
+  std::array<std::vector<Pilot>, 2> halves;
+  const std::size_t enough = (kEnoughPilots + pictures - 1) / pictures;
+  const std::size_t stretches = (enough + found() - 1) / std::max<std::size_t>(1, found());
+  const double all_tiles = static_cast<double>(tiles.count()) / static_cast<double>(seen);
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (PictureBlock& block : blocks[half]) {
+      add_pilots(halves[half], std::move(block.receivers), block.variant, stretches,
+                 block.share * all_tiles);
+    }
+  }
+  // Where one half has more, the others follow
   std::vector<Pilot> pilots;
-  for (std::size_t i = 0, found = 0; i < tiles.count() && found < blocks; ++i) {
-    found += add_pilots_of(subject, tiles[i], i, of_tile, plan.stretches, frame, executor, pilots);
+  for (std::size_t i = 0; i < std::max(halves[0].size(), halves[1].size()); ++i) {
+    for (std::vector<Pilot>& half : halves) {
+      if (i < half.size()) pilots.push_back(std::move(half[i]));
+    }
   }
   return pilots;
 }
@@ -308,7 +340,7 @@ std::vector<Pilot> pilots_of_frames(const Subject& subject, const std::vector<Ca
   std::vector<Pilot> pilots;
   for (std::size_t k = 0; k < frames; ++k) {
     if (frames > 1) look(pilot_camera(cameras, k));
-    const std::vector<Pilot> some = pilots_of(subject, frames, frame, executor);
+    const std::vector<Pilot> some = pilots_of(subject, k, frames, frame, executor);
     pilots.insert(pilots.end(), some.begin(), some.end());
   }
   if (frames > 1) look(cameras.front());

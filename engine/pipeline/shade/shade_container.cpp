@@ -1,8 +1,8 @@
 // Receivers are read in Z-order, shaded in batches and written in the same order. Pilots, which
-// choose the settings, are short runs of the same receivers:
+// choose the settings, are some of the blocks of the same receivers:
 //
 //   receivers    |--------------------------------------------------------------------------|
-//   pilots         |====|            |====|            |====|            |====|       tune()
+//   pilots         |==|              |==|              |==|              |==|         tune()
 //   batches      |--------|--------|--------|--------|--------|--------|--------|----- shade()
 #include "engine/pipeline/shade/shade_container.h"
 
@@ -265,7 +265,9 @@ class Lifting {
   RisePlace rise_;
 };
 
-/// Returns pilots that stand for all receivers: some of the blocks that are shaded.
+/// Returns pilots that stand for all receivers: some of the blocks that are shaded. (A batch is put
+/// along the curve of the scene before it is cut, so the receivers of another container may be cut
+/// a little elsewhere.)
 std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
   const ContainerReader& container = receivers.container;
   const PilotPlan plan = plan_pilots(receivers.points, Shader::kBlock);

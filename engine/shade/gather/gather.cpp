@@ -91,6 +91,7 @@ void Gather::place(std::span<const Receiver> from) {
 
 void Gather::sum_weights(std::span<const float> weights) {
   weight_before_.clear();
+  work_ = {};
   if (weights.empty()) return;
   double sum = 0;
   for (const PlacedReceiver& receiver : receivers_) {
@@ -98,7 +99,7 @@ void Gather::sum_weights(std::span<const float> weights) {
     sum += static_cast<double>(weights[receiver.index]);
   }
   weight_before_.push_back(sum);
-  work_.receivers += sum;
+  work_.receivers = sum;
 }
 
 // The weight of the receivers of a cell; their number, where all have results.

@@ -51,8 +51,8 @@ class Gather {
              const DirectionGrid& grid, std::span<const float> weights = {});
   /// The counts of all calls so far.
   [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
-  /// What the receivers of all calls with weights take of the work, each its share of what it has
-  /// in common with the whole call, whether that was shaded or not.
+  /// What the receivers of the last call take of the work, if it had weights: each its share of
+  /// what it has in common with the whole call, whether that was shaded or not.
   [[nodiscard]] const GatherWork& work() const noexcept { return work_; }
 
  private:

@@ -23,7 +23,7 @@ namespace {
 // Seeds of the rays that settings are judged by, and of rays that shade receivers: far from those
 // of pilots
 constexpr std::uint64_t kJudgeSeed = std::uint64_t{1} << 50, kRaySeed = std::uint64_t{1} << 51;
-constexpr double kJudgePhase = 0.77;  // none of those of pilots
+constexpr double kJudgePhase = 0.77;  // of the receivers that judge, in other stretches
 
 using Blocks = std::vector<std::vector<Receiver>>;
 
@@ -107,6 +107,7 @@ class Judge {
     const DirectionGrid grid(gather.resolution, options_.sky);
     std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
     std::vector<std::vector<Shading>> results(pilots_.size());
+    std::vector<GatherWork> works(pilots_.size());
     executor_.for_each(pilots_.size(), [&](std::size_t i, unsigned thread) {
       if (!gathers[thread]) {
         gathers[thread] =
@@ -114,13 +115,10 @@ class Judge {
       }
       const std::vector<Compared> some =
           candidates ? candidates_of(pilots_[i]) : pilots_[i].compared;
-      results[i] = shade_some(*gathers[thread], pilots_[i], some, grid);
+      results[i] = shade_some(*gathers[thread], pilots_[i], some, grid, works[i]);
     });
     if (candidates) return results;
-    GatherWork& work = works_[setting];
-    for (const auto& done : gathers) {
-      if (done) work.add(done->work());
-    }
+    for (const GatherWork& work : works) works_[setting].add(work);
     return results;
   }
 
@@ -192,11 +190,10 @@ std::vector<KnobRow> measure_knob(const SceneChoice& choice, const KnobOptions& 
         const PilotPlan plan = plan_pilots(set.receivers.size(), Shader::kBlock);
         std::vector<Pilot> pilots =
             pilots_of(blocks, plan.blocks * plan.stretches, (seed + 0.5) / options.seeds);
-        ReceiverPlaces places;
         std::vector<Shading> traced;
         Progress silent;
         KnobChoice& made = row.choices.emplace_back();
-        made.tuning = tune(container, shade, asked, true, pilots, executor, silent, places, traced);
+        made.tuning = tune(container, shade, asked, true, pilots, executor, silent, traced);
         const std::size_t setting = made.tuning.setting;
         const unsigned rays = made.tuning.receiver_rays;
         made.error = rays > 0 ? judge.error_of_rays(rays) : judge.error_of(setting);
