@@ -54,10 +54,19 @@ std::string for_parallel(const FarmPlan& plan) {
       "set -e\n",
       plan.scene.string());
   for (const TaskKind kind : kKinds) {
+    const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
     text += "parallel --halt soon,fail=1 \"$@\" <<'TASKS'\n";
-    for (const FarmTask* task : tasks_of(plan, kind)) text += line_of(*task) + "\n";
+    for (const FarmTask* task : tasks)
+      text += line_of(*task) + (tasks.size() > 1 ? " --threads 1\n" : "\n");
     text += "TASKS\n";
   }
+  return text;
+}
+
+/// Returns a path as Slurm takes it in a pattern of names.
+std::string without_pattern(const std::filesystem::path& path) {
+  std::string text;
+  for (const char c : path.string()) text += c == '%' ? std::string("%%") : std::string(1, c);
   return text;
 }
 
@@ -68,7 +77,7 @@ std::string array_of(const FarmPlan& plan, std::span<const FarmTask* const> task
   const FarmTask& first = *tasks.front();
   const double seconds = (*std::ranges::max_element(tasks, {}, &FarmTask::seconds))->seconds;
   const std::string number = fmt::format("\"$((SLURM_ARRAY_TASK_ID + {}))\"", first.number);
-  const std::string log = (plan.folder() / "log" / fmt::format("{}.%a", name)).string();
+  const std::string log = without_pattern(plan.folder() / "log" / name) + ".%a";
   return fmt::format(
       "{0}=$(sbatch --parsable --requeue --kill-on-invalid-dep=yes --job-name={1} \\\n"
       "  --array=0-{2} --mem={3}M --time={4} \\\n"
@@ -120,6 +129,10 @@ std::string for_openjd(const FarmPlan& plan) {
     for (std::size_t i = 1; i < first.command.size(); ++i) {
       const bool is_number = first.command[i - 1] == "--number";
       arguments.push_back(is_number ? "{{Task.Param.Number}}" : first.command[i]);
+    }
+    if (tasks.size() > 1) {  // a machine may run many beside each other
+      arguments.push_back("--threads");
+      arguments.push_back("1");
     }
     Json step{{"name", name_of(kind)}};
     if (!before.empty()) step["dependencies"] = Json::array({{{"dependsOn", before}}});

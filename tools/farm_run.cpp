@@ -55,11 +55,20 @@ class Runner {
       progress_.advance(1);
     }
     while (start_ready() || !running_.empty()) await_one();
+    require_all_started();
     progress_.end();
     return std::move(result_);
   }
 
  private:
+  /// Refuses a plan in which tasks wait for each other, or for tasks that it does not have.
+  void require_all_started() const {
+    if (waiting_.empty() || !result_.failed.empty()) return;
+    std::string names;
+    for (const FarmTask* task : waiting_) names += (names.empty() ? "" : ", ") + task->name();
+    throw DataError(plan_.file.string() + ": the tasks before these never end: " + names);
+  }
+
   /// Starts all tasks that may run and fit. @return whether one was started
   bool start_ready() {
     if (!result_.failed.empty()) return false;

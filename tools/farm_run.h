@@ -22,7 +22,8 @@ struct FarmRun {
 /// Runs all tasks that are not done, each as a process of its own. After a failure no task is
 /// started; those that run are awaited.
 /// @param run  the cap on the memory of all tasks together, and the number of threads
-/// @throws LimitError when the cap is smaller than the memory of a task; std::system_error
+/// @throws LimitError when the cap is smaller than the memory of a task; DataError when tasks wait
+///         for such as never run; std::system_error
 [[nodiscard]] FarmRun run_plan(const FarmPlan& plan, const RunOptions& run, Progress& progress);
 
 }  // namespace ptc

@@ -184,7 +184,7 @@ ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& pr
 ptc::FarmPlan only_plan(const Arguments& arguments) {
   if (arguments.files.size() != 1) throw CLI::ValidationError("FILE", "takes one plan");
   ptc::check_input(arguments.files[0]);
-  return ptc::read_plan(arguments.files[0]);
+  return ptc::read_plan(arguments.files[0], command_of);
 }
 
 ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {

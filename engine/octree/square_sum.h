@@ -13,8 +13,8 @@ namespace ptc {
 /// The sum of the squares of floats, without rounding: one file and the parts of a scene record the
 /// same area to the last bit, wherever the points are cut.
 ///
-/// A float is m 2^e with m below 2^24. For each of the 255 exponents there is a sum of m^2, a whole
-/// number of 128 bits.
+/// A float is m 2^e with m below 2^24. For each of the 256 exponents that its bits can say there is
+/// a sum of m^2, a whole number of 128 bits.
 class SquareSum {
  public:
   /// Adds the square of a number. @param value  finite and not negative
@@ -39,7 +39,7 @@ class SquareSum {
 
  private:
   static constexpr unsigned kFraction = 23;       // stored bits of a float behind its point
-  static constexpr std::size_t kExponents = 255;  // of finite floats
+  static constexpr std::size_t kExponents = 256;  // the last is that of infinity
   using Wide = std::array<std::uint64_t, 2>;      // low half first
 
   static void add(Wide& sum, const Wide& term) noexcept {

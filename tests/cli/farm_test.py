@@ -192,6 +192,11 @@ class Farm(ProgramTest):
             self.assertRegex(call, r"--requeue .*--mem=3\d\dM --time=\d+ ")
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
 
+    def test_slurm_does_not_take_a_name_as_a_pattern(self):
+        self.succeed("ptcfarm", "plan", "--city", "8k", "-o", self.here / "50%j.json")
+        self.succeed("ptcfarm", "export", self.here / "50%j.json", "--for", "slurm", "-o", self.here / "farm.sh")
+        self.assertIn("50%%j.parts/log/route_0.%a'", (self.here / "farm.sh").read_text())
+
     def test_the_template_for_open_job_description_has_a_step_for_each_kind(self):
         self.plan(self.cloud, parts=3)
         job = json.loads(self.export("openjd", "job.json").read_text())
@@ -202,6 +207,7 @@ class Farm(ProgramTest):
         for step in job["steps"]:
             numbers, = step["parameterSpace"]["taskParameterDefinitions"]
             run_line = step["script"]["actions"]["onRun"]
+            self.assertEqual(run_line["args"][-2:] == ["--threads", "1"], step["name"] == "part")
             for number in range(int(numbers["range"].split("-")[1]) + 1):
                 words = [word.replace("{{Task.Param.Number}}", str(number)) for word in run_line["args"]]
                 self.succeed(run_line["command"], *words)
@@ -212,6 +218,65 @@ class Farm(ProgramTest):
         for output, said in (("farm.json", "is the plan itself"), ("farm.txt", "must end in")):
             self.assertIn(said, self.fail_with(2, "ptcfarm", "export", self.here / "farm.json", "-o", self.here / output))
         self.assertIn("must end in .json", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "o.sh"))
+
+    def test_a_plan_that_would_write_over_an_input_is_refused(self):
+        statue, link, copy = (self.here / name for name in ("statue.ptcx", "link.ptcx", "copy.ptcx"))
+        shutil.copyfile(self.scene, statue)
+        link.symlink_to(statue)
+        self.plan(self.cloud)
+        self.run_plan()
+        shutil.copyfile(self.here / "farm.ptcx", copy)
+        before = statue.read_bytes()
+        for arguments, names in ((["statue.ptcx", "-o", "statue.json"], ["statue.ptcx", "an input"]),
+                                 (["statue.ptcx", "-o", "o.json", "--scene", "statue.ptcx"], ["statue.ptcx", "an input"]),
+                                 (["statue.ptcx", "-o", "link.json"], ["link.ptcx", "statue.ptcx"]),
+                                 (["link.ptcx", "-o", "statue.json"], ["link.ptcx", "statue.ptcx"]),
+                                 (["farm.parts/0.ptcx", "-o", "farm.json"], ["farm.parts", "0.ptcx, which is an input"]),
+                                 (["copy.ptcx", "-o", "farm.json"], ["farm.parts", "a part of copy.ptcx"]),
+                                 (["copy.ptcx", "-o", "o.json", "--scene", "farm.parts/1.ptcx"], ["a part of copy.ptcx"])):
+            with self.subTest(arguments):
+                message = self.fail_with(2, "ptcfarm", "plan", *arguments, cwd=self.here)
+                for said in ("would be written over", *names):
+                    self.assertIn(said, message)
+        self.assertEqual(statue.read_bytes(), before)
+        message = self.fail_with(2, "ptcfarm", "plan", self.scene, "-o", self.here / "a\nb.json")
+        self.assertIn("no control characters", message)
+
+    def test_a_plan_says_neither_other_tasks_nor_what_they_run_and_write(self):
+        path, kept = self.here / "farm.json", self.here / "kept"
+        kept.write_text("kept")
+        whole = json.dumps(self.plan("--city", "30k"))
+        # Commands and files follow from the plan
+        plan = json.loads(whole)
+        for task in plan["tasks"]:
+            task.update(command=["ptcfarm", "--version"], outputs=[str(kept)], inputs=[], after=["part.9"])
+        path.write_text(json.dumps(plan))
+        self.assertEqual(self.run_plan()["ran"], len(plan["tasks"]))
+        self.assertEqual(kept.read_text(), "kept")
+        self.assertTrue((self.here / "farm.ptcx").exists())
+        # So do the tasks
+        for change, said in ((lambda p: p["tasks"].pop(), "and a join"), (lambda p: p["tasks"].reverse(), "and a join"),
+                             (lambda p: p["tasks"][1].update(number=7), "and a join"),
+                             (lambda p: p["cuts"].pop(), "and a join"), (lambda p: p["cuts"].reverse(), "do not ascend"),
+                             (lambda p: p["inputs"][0].update(taken=[True]), "number of channels"),
+                             (lambda p: p["inputs"].clear(), "no inputs"),
+                             (lambda p: p["tasks"][0].update(seconds=-1), "seconds"),
+                             (lambda p: p.update(scene="farm.ptcx"), "no absolute path")):
+            plan = json.loads(whole)
+            change(plan)
+            path.write_text(json.dumps(plan))
+            message = self.fail_with(1, "ptcfarm", "run", path)
+            self.assertIn(str(path), message)
+            self.assertIn(said, message)
+
+    def test_an_input_that_got_other_channels_is_refused(self):
+        cloud = self.here / "c.ply"
+        write_ply(cloud, [(*point, 7) for point in ball(900)], CHANNELS)
+        self.plan(cloud)
+        write_ply(cloud, ball(900))
+        message = run("ptcfarm", "route", self.here / "farm.json")
+        self.assertEqual(message.returncode, 1)
+        self.assertIn(f"{cloud}: the file changed since it was planned: plan again", message.stderr)
 
     def test_other_or_damaged_plans_are_refused(self):
         path = self.here / "farm.json"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 #include <fstream>
+#include <limits>
 
 #include <catch2/catch.hpp>
 
@@ -141,6 +142,27 @@ TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refus
   change(whole);
   CHECK_THROWS_WITH(RangeReader(dir / "route", kPlan + 1, kRow),
                     Catch::Contains("of another plan"));
+}
+
+TEST_CASE("range file: a point that no container can hold is refused by name",
+          "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  const auto refused = [&](auto change) {
+    Points points = some_points(50);
+    change(points.records[20]);
+    write(dir / "route", points, {});
+    RangeReader reader(dir / "route", kPlan, kRow);
+    reader.open(0);
+    CHECK_THROWS_WITH(reader.next(), Catch::Contains((dir / "route").string()) &&
+                                         Catch::Contains("point 20: radius, radiance"));
+  };
+  refused([](PointRecord& point) { point.radius = std::numeric_limits<float>::infinity(); });
+  refused([](PointRecord& point) { point.radius = std::numeric_limits<float>::quiet_NaN(); });
+  refused([](PointRecord& point) { point.radius = -1; });
+  refused([](PointRecord& point) { point.radiance[1] = 0x7c00; });
+  refused([](PointRecord& point) { point.emission[2] = 0xbc00; });
+  refused([](PointRecord& point) { point.key.low = std::uint64_t{1} << 63; });
+  refused([](PointRecord& point) { point.flags = 1; });
 }
 
 TEST_CASE("range file: a writer that does not finish leaves nothing", "[farm][range_file]") {

@@ -22,7 +22,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
-constexpr std::uint64_t kVersion = 6;  // of the file; also the seed of its checksum
+constexpr std::uint64_t kVersion = 7;  // of the file; also the seed of its checksum
 constexpr std::size_t kHeadBytes = 32;
 constexpr int kLockTries = 10;
 constexpr std::chrono::milliseconds kLockWait(30);

@@ -15,10 +15,13 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/farm/cuts.h"
 #include "engine/pipeline/farm/plan_json.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/store/reader.h"
 #include "format/checksum.h"
+#include "format/node_page.h"
 
 namespace ptc {
 namespace {
@@ -31,6 +34,7 @@ constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
 constexpr std::size_t kMaxParts = 10'000;
+constexpr double kMaxSeconds = 1e9;  // of a task
 
 void check_request(const BuildRequest& request) {
   check_page_shift(request.page_shift);
@@ -42,6 +46,68 @@ void check_request(const BuildRequest& request) {
                   "city_points", "`city_points` excludes files and the order of inputs");
   require_request(!request.lights, "lights",
                   "a farm builds points with the light that they have: light them afterwards");
+}
+
+/// Says whether two paths lead to one file, or to one name of a file that does not exist.
+bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code absent;
+  return std::filesystem::equivalent(a, b, absent) || same_name(a, b);
+}
+
+/// Says whether a file lies in a folder or below it. A link counts where it lies and where it
+/// leads.
+bool lies_in(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  const std::filesystem::path top = std::filesystem::weakly_canonical(folder);
+  const auto below = [&](const std::filesystem::path& path) {
+    return std::mismatch(top.begin(), top.end(), path.begin(), path.end()).first == top.end();
+  };
+  return below(std::filesystem::weakly_canonical(file)) ||
+         below(std::filesystem::weakly_canonical(directory_of(file)));
+}
+
+/// Returns an input, and the parts of a scene of parts.
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& input) {
+  std::vector<std::filesystem::path> files{input};
+  if (!std::filesystem::is_regular_file(input) || !is_container(input)) return files;
+  const ContainerReader container(input, ContainerReader::OpenParts::no);
+  if (!container.header().has_parts()) return files;
+  const PartList list = container.read_parts();
+  for (const PartRecord& part : list.parts()) files.push_back(directory_of(input) / part.name);
+  return files;
+}
+
+/// Says whether a path has characters that end a line of a script or a table.
+bool has_control(const std::filesystem::path& path) {
+  return std::ranges::any_of(path.string(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte < 0x20 || byte == 0x7f;
+  });
+}
+
+/// Refuses a plan whose tasks would replace an input, or that scripts cannot name.
+void check_paths(const BuildRequest& request, const FarmPlan& plan) {
+  std::vector<std::filesystem::path> named = request.inputs;
+  named.push_back(plan.scene);
+  named.push_back(plan.file);
+  for (const std::filesystem::path& path : named) {
+    if (has_control(path))
+      throw RequestError("inputs", path.string() + ": a path has no control characters in a farm");
+  }
+  for (const std::filesystem::path& input : request.inputs) {
+    for (const std::filesystem::path& file : files_of(input)) {
+      const std::string what = file == input ? "an input" : "a part of " + input.string();
+      const auto refuse = [&](const std::filesystem::path& target) {
+        throw RequestError("inputs", fmt::format("{} would be written over {}, which is {}: choose "
+                                                 "another name",
+                                                 target.string(), file.string(), what));
+      };
+      if (same_file(file, plan.scene)) refuse(plan.scene);
+      if (same_file(file, plan.file)) refuse(plan.file);
+      if (lies_in(file, plan.folder())) refuse(plan.folder());
+    }
+  }
+  if (same_file(plan.scene, plan.file))
+    throw RequestError("inputs", plan.scene.string() + ": the scene and the plan are one file");
 }
 
 void check_inputs(const BuildInputs& inputs) {
@@ -104,6 +170,72 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
   join.disk_bytes = plan.parts() * 4096;
   join.seconds = 0.01 * static_cast<double>(plan.parts());
   plan.tasks.push_back(std::move(join));
+}
+
+void require(const FarmPlan& plan, bool holds, const char* rule) {
+  if (!holds) throw DataError(plan.file.string() + ": " + rule);
+}
+
+void check_channels(const FarmPlan& plan, const FarmInput& input) {
+  require(plan, input.taken.empty() || input.taken.size() == input.channels.size(),
+          "an input has another number of channels than of marks");
+  for (const Channel& channel : input.channels) {
+    const std::size_t bytes = channel.component_bytes();
+    require(plan, (bytes == 1 || bytes == 2 || bytes == 4 || bytes == 8) && channel.components > 0,
+            "a channel has no component of 1, 2, 4 or 8 bytes");
+  }
+}
+
+/// Checks what a plan says, but for its tasks.
+void check_plan(const FarmPlan& plan) {
+  require(plan, plan.scene.is_absolute() && plan.scene.has_filename() && !has_control(plan.scene),
+          "the scene is no absolute path without control characters");
+  require(plan, !has_control(plan.file), "a path has no control characters in a farm");
+  const BuildRequest& request = plan.request;
+  check_page_shift(request.page_shift);
+  const BuildOptions& tree = request.tree;
+  require(plan, tree.leaf_points >= 1 && tree.leaf_points <= kMaxLeafPoints,
+          "the number of points in a leaf is out of range");
+  require(plan, tree.levels_per_stream >= 1 && tree.levels_per_stream <= kLatticeBits,
+          "the number of levels in a stream is out of range");
+  require(plan, request.selection.every >= 1, "it takes the first of every 0 points");
+  require(plan, std::isfinite(plan.frame.edge) && plan.frame.edge > 0, "the frame has no edge");
+  require(plan, !plan.inputs.empty(), "it has no inputs");
+  for (const FarmInput& input : plan.inputs) {
+    require(plan, input.path.empty() == (request.city_points > 0),
+            "its inputs are neither files nor the city");
+    require(plan,
+            !input.path.empty() || (input.blocks.first <= input.blocks.end &&
+                                    input.blocks.end <= city_blocks(request.city_points)),
+            "an input has blocks that the city lacks");
+    check_channels(plan, input);
+  }
+  require(plan,
+          std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
+          "the cuts do not ascend");
+}
+
+/// Replaces the tasks that a file says by those that its plan implies. What a task needs may have
+/// been changed.
+void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
+  constexpr char kTasks[] =
+      "the tasks are not a route for each input, a part for each range, and a join";
+  const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
+  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1, kTasks);
+  add_tasks(plan, 0);
+  const auto same = [](const FarmTask& a, const FarmTask& b) {
+    return a.kind == b.kind && a.number == b.number;
+  };
+  require(plan, std::ranges::equal(said, plan.tasks, same), kTasks);
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    FarmTask& task = plan.tasks[i];
+    require(plan, said[i].seconds >= 0 && said[i].seconds <= kMaxSeconds,
+            "the seconds of a task are out of range");
+    task.memory_bytes = said[i].memory_bytes;
+    task.disk_bytes = said[i].disk_bytes;
+    task.seconds = said[i].seconds;
+    task.command = command(plan, task);
+  }
 }
 
 /// Divides the city into shares of some million points.
@@ -193,6 +325,10 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                    Progress& progress) {
   // Measure the inputs
   check_request(request);
+  FarmPlan plan{.file = std::filesystem::absolute(file),
+                .scene = std::filesystem::absolute(scene),
+                .request = request};
+  check_paths(request, plan);
   const MeshLimits limits{.reading = request.run.memory_bytes,
                           .kept = request.run.memory_bytes,
                           .traced = request.run.memory_bytes,
@@ -205,9 +341,6 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   if (inputs.bounds.empty()) throw DataError("the inputs have no points");
 
   // Write down what follows from them
-  FarmPlan plan{.file = std::filesystem::absolute(file),
-                .scene = std::filesystem::absolute(scene),
-                .request = request};
   for (const Clouds::Cloud& cloud : inputs.clouds.files) {
     if (cloud.place)
       throw RequestError("inputs",
@@ -243,11 +376,17 @@ void write_plan(FarmPlan& plan) {
   file.publish();
 }
 
-FarmPlan read_plan(const std::filesystem::path& file) {
+FarmPlan read_plan(const std::filesystem::path& file, const TaskCommand& command) {
   const InputFile in(file);
   std::string text(static_cast<std::size_t>(in.size()), '\0');
   in.read_at(0, std::as_writable_bytes(std::span(text)));
   FarmPlan plan = plan_from_json(text, std::filesystem::absolute(file));
+  try {
+    check_plan(plan);
+    complete_tasks(plan, command);
+  } catch (const RequestError& error) {
+    throw DataError(plan.file.string() + ": " + error.what());
+  }
   plan.id = xxh3_64(std::as_bytes(std::span(text)));
   return plan;
 }

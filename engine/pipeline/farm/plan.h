@@ -59,10 +59,13 @@ struct FarmInput {
 
 struct FarmPlan;
 
+/// Returns the command line of a task.
+using TaskCommand =
+    std::function<std::vector<std::string>(const FarmPlan& plan, const FarmTask& task)>;
+
 /// What make_plan() may choose.
 struct FarmOptions {
-  /// Returns the command line of a task.
-  std::function<std::vector<std::string>(const FarmPlan& plan, const FarmTask& task)> command;
+  TaskCommand command;
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
 };
@@ -98,7 +101,9 @@ struct FarmPlan {
 /// @param request  what to build. Inputs are clouds and containers whose points have normals and
 ///                 radii and keep the light that they have, or the city
 /// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
-///         light clouds, and for fields that a farm does not take; as build_container()
+///         light clouds, and for fields that a farm does not take; when the scene or the plan is an
+///         input or a part of one, when one lies in the folder of the parts, and for paths with
+///         control characters; as build_container()
 [[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
                                  const std::filesystem::path& file, const FarmOptions& options,
                                  Progress& progress);
@@ -106,8 +111,10 @@ struct FarmPlan {
 /// Writes a plan to its file, and sets its identity.
 /// @throws std::system_error
 void write_plan(FarmPlan& plan);
-/// Reads a plan.
-/// @throws DataError that names the file; std::system_error
-[[nodiscard]] FarmPlan read_plan(const std::filesystem::path& file);
+/// Reads a plan. What a task takes, writes and runs follows from the plan, whatever its file says.
+/// @param command  as for make_plan()
+/// @throws DataError that names the file, also when its tasks are not those that the plan implies;
+///         std::system_error
+[[nodiscard]] FarmPlan read_plan(const std::filesystem::path& file, const TaskCommand& command);
 
 }  // namespace ptc

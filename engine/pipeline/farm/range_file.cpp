@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
+
+#include <fmt/format.h>
 
 #include "engine/base/background.h"
 #include "engine/base/error.h"
@@ -20,6 +23,14 @@ namespace {
 constexpr std::size_t kMinBlock = 64, kMaxBlock = std::size_t{1} << 14;  // points
 constexpr std::size_t kEndBytes =
     3 * sizeof(std::uint64_t);  // place, length, checksum of the table
+
+/// Says whether a container may hold a point. Colours may be negative zeros.
+bool storable(const PointRecord& point) noexcept {
+  const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
+  return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
+         point.flags == 0 && (point.key.high | point.key.low) >> 63 == 0 &&
+         std::ranges::all_of(point.radiance, usual) && std::ranges::all_of(point.emission, usual);
+}
 
 /// Returns a name for a file until it is published.
 std::filesystem::path partial_of(const std::filesystem::path& target) {
@@ -196,6 +207,14 @@ bool RangeReader::next() {
   }
   points_.resize(count);
   std::memcpy(points_.data(), bytes_.data(), count * sizeof(PointRecord));
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!storable(points_[i])) {
+      throw DataError(fmt::format(
+          "{}: offset {}: point {}: radius, radiance and emission must be finite and not negative, "
+          "the key below 2^126 and the flags 0",
+          path_.string(), block.offset, i));
+    }
+  }
   return true;
 }
 

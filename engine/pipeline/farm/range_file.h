@@ -95,7 +95,7 @@ class RangeReader {
   /// Starts to read a range.
   void open(std::uint32_t range);
   /// Reads the next block of the range. @return whether there was one
-  /// @throws DataError when it is damaged
+  /// @throws DataError when it is damaged, or has a point that a container cannot hold
   [[nodiscard]] bool next();
   /// The points of the block.
   [[nodiscard]] std::span<const PointRecord> block() const noexcept { return points_; }

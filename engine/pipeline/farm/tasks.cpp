@@ -85,16 +85,23 @@ class Route {
     } else {
       for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
       const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
+      require_planned(file.info.channels == input.channels);
       const std::uint64_t before = points_;
       feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
-      if (points_ - before != input.points)
-        throw DataError(input.path.string() + ": the file changed since it was planned");
+      require_planned(points_ - before == input.points);
     }
     writer_.finish();
     progress_.end();
   }
 
  private:
+  /// Refuses an input that is not as the plan says.
+  void require_planned(bool holds) const {
+    if (holds) return;
+    throw DataError(plan_.inputs[number_].path.string() +
+                    ": the file changed since it was planned: plan again");
+  }
+
   [[nodiscard]] std::uint64_t writer_bytes(std::uint64_t cap) const {
     MemoryBudget budget = budget_of(cap, "this route");
     return budget.rest("the ranges", RangeWriter::least_memory(plan_.parts(), plan_.row()));
