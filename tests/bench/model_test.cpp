@@ -24,7 +24,7 @@ ModelOptions small() {
   options.scene.points = 8'000;
   options.scene.shaded_width = 64;
   options.scene.shaded_height = 36;
-  options.checked = 40;
+  options.checked = 160;
   options.reference_rays = 8192;
   options.repeats = 1;
   options.solid_angles = {0.1F, 0.02F};
