@@ -242,9 +242,8 @@ std::vector<Shading> Estimator::shade_compared(const SceneView& view, std::span<
   executor.for_each(pilots.size(), [&](std::size_t i, unsigned thread) {
     if (!gathers[thread])
       gathers[thread] = std::make_unique<Gather>(view, *cache_, options_.gather);
-    GatherWork work;
     compared[i] = shade_some(*gathers[thread], pilots[i], pilots[i].compared,
-                             *grids[(pilots[i].variant + turn) % grids.size()], work);
+                             *grids[(pilots[i].variant + turn) % grids.size()]);
   });
   std::vector<Shading> all;
   for (const std::vector<Shading>& some : compared) all.insert(all.end(), some.begin(), some.end());

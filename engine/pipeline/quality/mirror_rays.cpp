@@ -1,9 +1,7 @@
 #include "engine/pipeline/quality/mirror_rays.h"
 
-#include <cmath>
-#include <numbers>
-
 #include "engine/pipeline/quality/error_sums.h"
+#include "engine/pipeline/quality/pilot_rays.h"
 
 namespace ptc {
 
@@ -24,17 +22,7 @@ MirrorTuning tune_mirrors(RayShader& shader, std::span<const Pilot> pilots, Mirr
   for (;; tuning.rays *= 2) {
     mirrors.rays = tuning.rays;
     shader.reflect(twice, mirrors, 0, traced);
-    const std::vector<Shading> results = as_shading(traced);
-    ErrorSums sums;
-    std::size_t i = 0;
-    for (const Pilot& pilot : pilots) {
-      for (const Compared& one : pilot.compared) {
-        sums.add(results[2 * i], results[2 * i], results[2 * i + 1], one.weight);
-        ++i;
-      }
-    }
-    // The noise of the sums is that of a mean of two
-    tuning.noise = std::numbers::sqrt2 * sums.error().relative_noise();
+    tuning.noise = noise_of(pilots, as_shading(traced));
     tuning.met = tuning.noise <= asked;
     if (tuning.met || tuning.rays == kMostMirrorRays || mirrors.roughness == 0) return tuning;
   }

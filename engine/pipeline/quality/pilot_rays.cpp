@@ -38,11 +38,6 @@ ErrorSums sums_of(std::span<const Pilot> pilots, std::span<const Shading> traced
   return sums;
 }
 
-/// Returns the noise of one of the two results of a receiver.
-double noise_of(std::span<const Pilot> pilots, std::span<const Shading> traced) {
-  return std::sqrt(2) * sums_of(pilots, traced).error().relative_noise();
-}
-
 /// Returns the noise of each receiver. Two results tell little of it, so that it is averaged with
 /// those of its pilot and of all.
 /// @param noise  of a result in the mean of all receivers
@@ -108,6 +103,11 @@ std::vector<unsigned> share_rays(std::span<const Noisy> receivers, double asked)
 
 double PilotRays::rays_for(double noise) const {
   return rays_of_noise_1 * std::pow(noise, -1 / kFall);
+}
+
+double noise_of(std::span<const Pilot> pilots, std::span<const Shading> traced) {
+  // The noise of the sums is that of a mean of two
+  return std::numbers::sqrt2 * sums_of(pilots, traced).error().relative_noise();
 }
 
 PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& discs,

@@ -26,6 +26,10 @@ struct PilotRays {
   [[nodiscard]] double rays_for(double noise) const;
 };
 
+/// Returns the noise of one of the two results of a receiver, as CheckError::relative_noise().
+/// @param traced  two results for each compared receiver, side by side, pilot by pilot
+[[nodiscard]] double noise_of(std::span<const Pilot> pilots, std::span<const Shading> traced);
+
 /// Traces the same number of rays at every receiver.
 /// @param rays  for each of the two results of a receiver
 [[nodiscard]] PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& discs,

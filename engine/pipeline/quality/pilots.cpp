@@ -60,13 +60,12 @@ std::vector<Receiver> compared_of(std::span<const Pilot> pilots) {
 }
 
 std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot, std::span<const Compared> some,
-                                const DirectionGrid& grid, GatherWork& work) {
+                                const DirectionGrid& grid) {
   const std::vector<Receiver>& block = *pilot.block;
   std::vector<float> weights(block.size());
   for (const Compared& one : some) weights[one.at] = static_cast<float>(one.weight);
   std::vector<Shading> all(block.size()), results;
   gather.shade(block, all, grid, weights);
-  work = gather.work();
   for (const Compared& one : some) results.push_back(all[one.at]);
   return results;
 }

@@ -74,13 +74,12 @@ void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigne
 /// Returns the compared receivers of all pilots, in order.
 [[nodiscard]] std::vector<Receiver> compared_of(std::span<const Pilot> pilots);
 
-/// Shades some receivers of a pilot's block as the run does.
+/// Shades some receivers of a pilot's block as the run does. Gather::work() tells what they took.
 /// @param grid  of the pilot's variant
-/// @param work  gets what they take
 /// @return      one result for each of them, in their order
 [[nodiscard]] std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot,
                                               std::span<const Compared> some,
-                                              const DirectionGrid& grid, GatherWork& work);
+                                              const DirectionGrid& grid);
 
 /// A set of receivers; those at the same position count as one.
 class ReceiverPlaces {

@@ -91,8 +91,7 @@ class Tuner {
   /// Chooses among the candidates of all pilots those that are compared.
   /// @param pilots  those that it was made for
   void survey(std::span<Pilot> pilots) {
-    std::vector<std::size_t> all(pilots.size());
-    std::iota(all.begin(), all.end(), 0);
+    const std::vector<std::size_t> all = every_pilot();
     std::vector<std::vector<Compared>> candidates;
     for (const Pilot& pilot : pilots) candidates.push_back(candidates_of(pilot));
     const auto of = [&](std::size_t i) -> std::span<const Compared> { return candidates[i]; };
@@ -120,14 +119,13 @@ class Tuner {
   }
 
   /// Shades all receivers of the pilots' stretches at a rung.
-  void shade_whole_blocks(std::size_t rung) {
-    std::vector<std::size_t> pilots(pilots_.size());
-    std::iota(pilots.begin(), pilots.end(), 0);
+  void shade_stretches(std::size_t rung) {
     std::vector<std::vector<Compared>> whole(pilots_.size());
     for (std::size_t i = 0; i < pilots_.size(); ++i) {
       for (std::size_t at = pilots_[i].begin; at < pilots_[i].end; ++at) whole[i].push_back({at});
     }
-    shade(rung, pilots, [&](std::size_t i) -> std::span<const Compared> { return whole[i]; });
+    shade(rung, every_pilot(),
+          [&](std::size_t i) -> std::span<const Compared> { return whole[i]; });
   }
 
   /// Returns the cheapest rung that meets `asked` at the choosing and at the confirming pilots; the
@@ -182,6 +180,13 @@ class Tuner {
 
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
+
+  /// Returns the numbers of all pilots.
+  [[nodiscard]] std::vector<std::size_t> every_pilot() const {
+    std::vector<std::size_t> all(pilots_.size());
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
 
   /// Returns the cheapest rung that meets `asked` at the choosing pilots, provided that errors fall
   /// along the ladder; the size of the ladder when there is none.
@@ -273,7 +278,8 @@ class Tuner {
         gathers[thread] = std::make_unique<Gather>(view_, *cache_, gather, visibility);
       const Pilot& pilot = pilots_[pilots[k]];
       results[k] = shade_some(*gathers[thread], pilot, some_of(pilots[k]),
-                              *grids[pilot.variant % grids.size()], works[k]);
+                              *grids[pilot.variant % grids.size()]);
+      works[k] = gathers[thread]->work();
     });
     // In the order of the pilots: sums of floats must not depend on which thread shades which
     for (const GatherWork& work : works) works_[rung].add(work);
@@ -405,7 +411,7 @@ std::vector<RungError> climb(const ContainerReader& scene, const ShadeOptions& o
   for (std::size_t rung = 0; rung < ladder().size(); ++rung) {
     const std::uint64_t shaded = tuner.shaded();
     const double before = cpu_seconds();
-    tuner.shade_whole_blocks(rung);
+    tuner.shade_stretches(rung);
     const auto count = static_cast<double>(std::max<std::uint64_t>(1, tuner.shaded() - shaded));
     const double seconds = cpu_seconds() - before;
     rungs.push_back({tuner.measure(rung, true).error, seconds * 1e6 / count});

@@ -16,8 +16,8 @@ namespace ptc {
 ///           |  p--->x    when the camera moves; x does not.
 ///     ------+--------
 ///
-/// Of two walls it keeps from both, and stands half way where they are too close; of more, from the
-/// two nearest ones.
+/// A receiver between two walls keeps from both, and stands half way where they are too close; of
+/// three or more walls it keeps from the two nearest ones.
 /// @param normal   of the surface at the place, unit, turned to where the ray comes from
 /// @param towards  direction of the ray, unit
 /// @param lift     by which the receiver will rise, scene units

@@ -115,7 +115,8 @@ class Judge {
       }
       const std::vector<Compared> some =
           candidates ? candidates_of(pilots_[i]) : pilots_[i].compared;
-      results[i] = shade_some(*gathers[thread], pilots_[i], some, grid, works[i]);
+      results[i] = shade_some(*gathers[thread], pilots_[i], some, grid);
+      works[i] = gathers[thread]->work();
     });
     if (candidates) return results;
     for (const GatherWork& work : works) works_[setting].add(work);

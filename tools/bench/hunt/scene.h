@@ -75,7 +75,7 @@ struct HuntScene {
 
 /// Draws a scene of one to six shapes, of 200 to 4,000 surfels and 48 receivers: three patches of
 /// neighbours on surfaces, lone ones on surfaces, and some off surfaces. No radiance is above 1.
-/// The same seed draws the same scene.
+/// A seed always draws the same scene.
 [[nodiscard]] HuntScene draw_scene(std::uint64_t seed);
 
 /// Returns the surfels of a scene, in its shapes' order.

@@ -48,7 +48,7 @@ std::vector<Panel> furniture(float scale) {
   return panels;
 }
 
-/// The same in the dark, with a lamp of 0.15 x 0.15 above it.
+/// Returns furniture() that is dark but for a lamp of 0.15 x 0.15 above it.
 std::vector<Panel> furniture_with_lamp() {
   constexpr glm::vec3 kLamp(40, 36, 28);
   std::vector<Panel> panels = furniture(0.1F);
