@@ -329,11 +329,11 @@ class Bench(ProgramTest):
 
     def test_caches_answer_alike_and_leave_their_files_alone(self):
         charts = self.here / "charts"
-        printed = self.succeed("ptcbench", "cache", "--quick", "--points", "120k", "--receivers", "4096", "--repeats", "1", "--threads", "2",
+        printed = self.succeed("ptcbench", "cache", "--quick", "--points", "120k", "--receivers", "4096", "--repeats", "1", "--threads", "1",
                                "-o", charts, "--json")
         rows = json.loads((charts / "cache.json").read_text())["rows"]
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
-        self.assertEqual([r["panel"] for r in rows if r["threads"] == 2 and r["cap"] == 1].count("hits"), 4)
+        self.assertEqual([r["panel"] for r in rows].count("hits"), 4)
         self.assertEqual({r["panel"] for r in rows}, {"hits", "back-end", "threads", "receivers", "pages", "sizes"})
         ways = {r["method"] for r in rows if r["panel"] == "back-end"}
         self.assertTrue(ways >= {"pread", "mmap"})

@@ -109,6 +109,7 @@ TEST_CASE("cloud picture: a picture whose depth buffer does not fit is the same,
   City city;
   city.request.size = {{700, 300}};
   city.request.samples = 16;  // 80 MB of depth buffer
+  city.request.gather = {.solid_angle = 0.06F, .parallax = 0.3F, .resolution = 16};
   city.request.run.memory_bytes = std::uint64_t{1} << 30;
   const Image whole = city.render(city.request);
   city.request.run.memory_bytes = std::uint64_t{192} << 20;

@@ -90,7 +90,7 @@ TEST_CASE("estimate: errors at other receivers are as large as estimated and ord
 
 TEST_CASE("estimate: its channels exist when requested and change no other channel",
           "[integration][estimate]") {
-  const Scene scene(small_scene(0.04));
+  const Scene scene(small_scene(0.08));
   const LightingReport without = shade(scene, request_of(scene, false), "without.ptcx");
   const LightingReport with = shade(scene, request_of(scene, true), "with.ptcx");
   CHECK_FALSE(without.estimate);

@@ -153,7 +153,7 @@ Errors compare(const Mesh& mesh, const LightRig& rig, const Camera& camera) {
   const TemporaryDirectory dir;
   Progress silent;
   BuildRequest build{.mesh = std::make_shared<const Mesh>(mesh), .lights = rig};
-  build.sampling.count = 300'000;
+  build.sampling.count = 100'000;
   build_container(build, dir / "room.ptcx", silent);
   RenderRequest request{{.scene = dir / "room.ptcx", .bounces = 8}};
   request.mesh = build.mesh;

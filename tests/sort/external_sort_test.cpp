@@ -90,7 +90,7 @@ class FileSizeLimit {
 TEST_CASE("external sort: the result depends on neither cap nor threads", "[sort][external]") {
   for (const Keys keys : kAllKeys) {
     CAPTURE(static_cast<int>(keys));
-    const std::vector<PointRecord> input = make_records(keys, 30000);  // 1.2 MB
+    const std::vector<PointRecord> input = make_records(keys, 15000);  // 0.6 MB
     const std::vector<PointRecord> expected = stable_sorted(input);
     const std::vector<MortonKey> sample = sample_of(input, 2000);
     for (const std::uint64_t cap : {kMinCap, 64 * kMiB}) {
