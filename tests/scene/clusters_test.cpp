@@ -130,6 +130,27 @@ TEST_CASE("clusters: the two sides of a thin wall stay apart", "[scene][clusters
   }
 }
 
+TEST_CASE("clusters: their borders follow a ridge", "[scene][clusters]") {
+  // A roof whose slopes fall by 35 degrees
+  constexpr double kSlope = 0.7;
+  Mesh mesh = empty_mesh();
+  add_quad(mesh, {0, 0, 0}, {0, 0, 1}, {1, kSlope, 0});
+  add_quad(mesh, {1, kSlope, 0}, {0, 0, 1}, {1, -kSlope, 0});
+  SamplingOptions options;
+  options.spacing = 0.05;
+  const SpacingField field(options);
+  const SurfacePatch patch = SurfacePatches(mesh, field, 1e9).spread(0, 16);
+  std::vector<std::uint32_t> owners;
+  const auto clusters = cluster_points(patch.points, patch.surfels, 6, owners);
+  double astray = 0;  // points whose cluster has its middle on the other slope
+  for (std::size_t i = 0; i < patch.points.size(); ++i) {
+    const bool left = patch.points[i].position.x < 1;
+    if (left != (clusters[owners[i]].position.x < 1)) astray += 1;
+  }
+  // None is; of clusters that look at the distance alone, 0.4 % of the points are
+  CHECK(astray < 0.001 * static_cast<double>(patch.points.size()));
+}
+
 TEST_CASE("clusters: points of different kinds stay in different clusters", "[scene][clusters]") {
   auto points = square(32, {0, 1, 0}, 0, 0);
   const auto others = square(32, {0, 1, 0}, 0, 1);

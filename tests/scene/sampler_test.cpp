@@ -161,7 +161,7 @@ TEST_CASE("sampler: a surfel has the mean normal of its patch when the mesh is f
   double tilt = 0;
   const auto surfels = sample(mesh, 400);
   for (const Surfel& s : surfels) tilt += 1 - static_cast<double>(s.normal.y);
-  CHECK(tilt < 0.02 * static_cast<double>(surfels.size()));  // 0.07 with the normals of the roofs
+  CHECK(tilt < 0.025 * static_cast<double>(surfels.size()));  // 0.07 with the normals of the roofs
 }
 
 TEST_CASE("sampler: surfels extend past an edge about as much as they leave uncovered",

@@ -24,8 +24,9 @@ struct Cluster {
 /// the surface that it stands for.
 ///
 /// Clusters begin as equal stretches of the points. Then, `rounds` times, points join the nearest
-/// cluster of their kind that faces their way, and each cluster moves to the middle of its members:
-/// some 8 points of each cluster at first, all points in the last two rounds.
+/// cluster of their kind, where one that faces another way counts as farther away, and each cluster
+/// moves to the middle of its members: some 8 points of each cluster at first, all points in the
+/// last two rounds. So borders of clusters follow ridges.
 /// @param points  in an order that keeps neighbours together, and kinds and opposite sides apart
 /// @param count   wanted clusters; a number above points.size() counts as points.size()
 /// @param rounds  0 keeps the equal stretches

@@ -74,6 +74,10 @@ class ClusterColumns {
   // Cosine between a point's normal and its cluster's, at least: surfaces that turn by more than
   // 75 degrees do not share a cluster.
   static constexpr float kMinCosine = 0.26F;
+  // How much farther a cluster is taken to lie that faces another way: the squared distance grows
+  // by this times (1 - cosine). Half of a cluster across a ridge is seen from behind
+  // (spec/notes/surfels.md).
+  static constexpr float kTurned = 10;
   static constexpr float kNever = 1e36F;  // finite, and greater than any distance that counts
   static constexpr float kNobody = 8;     // kind of no point
   static constexpr std::size_t kRows = 256;
@@ -113,7 +117,7 @@ class ClusterColumns {
       const float cosine =
           normal_x[i] * p.normal.x + normal_y[i] * p.normal.y + normal_z[i] * p.normal.z;
       const float off_kind = kind[i] - p.kind;
-      const float square = dx * dx + dy * dy + dz * dz +
+      const float square = (dx * dx + dy * dy + dz * dz) * (1 + kTurned * (1 - cosine)) +
                            std::max(kMinCosine - cosine, 0.0F) * kNever +
                            off_kind * off_kind * kNever;
       const std::int32_t bits = std::bit_cast<std::int32_t>(square);
