@@ -55,6 +55,7 @@ constexpr std::array kFields{
     FieldName{"run.temp_dirs", "--temp"},
     FieldName{"run.threads", "--threads"},
     FieldName{"samples", "--samples"},
+    FieldName{"sampling.adapts", "--adapt"},
     FieldName{"sampling.camera", "--camera"},
     FieldName{"sampling.count", "--points"},
     FieldName{"sampling.finest", "--finest"},

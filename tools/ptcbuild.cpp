@@ -123,6 +123,9 @@ void declare_sampling(CLI::App& app, Arguments& arguments) {
       ->default_str("")
       ->excludes(points)
       ->group(kGroup);
+  app.add_flag("--adapt", sampling.adapts,
+               "Place more of them where meshes turn or light changes, fewer elsewhere")
+      ->group(kGroup);
 }
 
 void declare_camera(CLI::App& app, Arguments& arguments) {
@@ -193,9 +196,8 @@ void adopt_settings(Arguments& arguments, ptc::Command& command) {
 void note_options_of_meshes(const Arguments& arguments, const CLI::App& app,
                             ptc::Progress& progress) {
   if (!std::ranges::all_of(ptc::object_files(arguments.request.inputs), ptc::holds_points)) return;
-  std::vector<std::string> options{"--points",    "--spacing",           "--backdrop",
-                                   "--one-sided", "--pixels-per-surfel", "--finest",
-                                   "--sky-rays"};
+  std::vector<std::string> options{"--points",    "--spacing",           "--adapt",  "--backdrop",
+                                   "--one-sided", "--pixels-per-surfel", "--finest", "--sky-rays"};
   // Lamps light clouds, too
   if (!arguments.lights.given()) options.insert(options.end(), {"--sun-rays", "--area-rays"});
   ptc::note_unused(app, options, "no input is a mesh", progress);

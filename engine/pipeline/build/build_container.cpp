@@ -234,7 +234,8 @@ class Build {
   /// Returns the memory for meshes. While they are read, nothing else takes any.
   [[nodiscard]] MeshLimits mesh_limits() const {
     const MemoryBudget budget = build_budget();
-    const std::uint64_t sampling = sampling_bytes(0, request_.sampling.count, 1);
+    const std::uint64_t sampling =
+        sampling_bytes(0, request_.sampling.count, request_.sampling.adapts, 1);
     // Meshes that are kept leave room for streaming. One that takes less than streaming does is
     // better in memory
     constexpr std::uint64_t kLeast = StreamingRoom::kLeastBytes;
@@ -347,8 +348,8 @@ class Build {
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
       charge_mesh(budget, lit->mesh, &lit->rays);
-      const std::uint64_t fixed =
-          sampling_bytes(lit->mesh.triangles.size(), request_.sampling.count, 0);
+      const std::uint64_t fixed = sampling_bytes(
+          lit->mesh.triangles.size(), request_.sampling.count, request_.sampling.adapts, 0);
       const std::uint64_t writers =
           ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()) -
           ContainerWriter::writing_bytes(request_.page_shift, 1);
@@ -357,6 +358,12 @@ class Build {
       budget.charge("sampling", fixed + room.at_once * kSampledPatchBytes);
     }
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
+      if (request_.sampling.adapts) {
+        progress_.note(
+            "the meshes do not fit in memory: their surfels are spaced evenly, because to adapt "
+            "the "
+            "spacing takes rays at all of them");
+      }
       budget.charge("the meshes", streamed->parts.bytes());
       std::vector<Material> materials = streamed->parts.materials();
       for (const PlacedMesh& placed : streamed->parts.placed())

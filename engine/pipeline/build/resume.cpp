@@ -90,6 +90,7 @@ std::string text_of(const BuildRequest& request) {
   line("`sampling.count`", sampling.count);
   line("`sampling.spacing`", sampling.spacing);
   line("the camera", sampling.camera ? to_json(*sampling.camera) : "none");
+  line("`sampling.adapts`", sampling.adapts);
   line("`sampling.pixels_per_surfel`", sampling.pixels_per_surfel);
   line("`sampling.finest`", sampling.finest);
   const LightSampling& rays = sampling.lights;

@@ -146,6 +146,13 @@ Surfel PatchSampler::place(const Group& group, const SurfacePoint& nearest,
   return surfel;
 }
 
+SurfaceHit PatchSampler::lit_place(const Group& group, std::span<const SurfacePoint> points,
+                                   std::size_t index, std::size_t count) const {
+  const SurfacePoint& point =
+      points[group.members[(2 * index + 1) * group.members.size() / (2 * count)]];
+  return scene_.surface(point.triangle, point.uv.x, point.uv.y);
+}
+
 // Returns the mean radiance that a group reflects on one side, from those of a few of its points
 // that are not buried, or nothing when all of them are.
 // @param side  1 for the front, -1 for the back
@@ -153,13 +160,12 @@ std::optional<glm::vec3> PatchSampler::reflected(const Group& group,
                                                  std::span<const SurfacePoint> points, float side,
                                                  std::uint64_t seed) const {
   if (light_ == nullptr) return glm::vec3(0);
-  const std::size_t size = group.members.size(), count = std::min<std::size_t>(kLitPoints, size);
+  const std::size_t count = std::min<std::size_t>(kLitPoints, group.members.size());
   glm::vec3 sum(0);
   float looked_at = 0;  // points that are not buried
   bool seen = false;    // one of them is not dark
   for (std::size_t i = 0; i < count; ++i) {
-    const SurfacePoint& point = points[group.members[(2 * i + 1) * size / (2 * count)]];
-    const SurfaceHit at = scene_.surface(point.triangle, point.uv.x, point.uv.y);
+    const SurfaceHit at = lit_place(group, points, i, count);
     const Arriving arriving = look_at(at, side > 0, kLitPoints * seed + i);
     if (arriving.place == Place::buried) continue;
     if (light_->is_black()) return glm::vec3(0);
@@ -231,6 +237,51 @@ PatchSampler::Arriving PatchSampler::look_at(const SurfaceHit& at, bool front,
 
 bool PatchSampler::is_seen(const SurfaceHit& at, bool front, std::uint64_t seed) const {
   return look_at(at, front, seed).place == Place::seen;
+}
+
+std::vector<SurfaceDetail> PatchSampler::look_closely(const SurfacePatch& patch) const {
+  constexpr unsigned kRoughRounds = 3;
+  constexpr std::size_t kPlaces = 4;
+  std::vector<std::uint32_t> owners;
+  const std::vector<Cluster> clusters =
+      cluster_points(patch.points, patch.surfels, kRoughRounds, owners);
+  std::vector<SurfaceDetail> details;
+  std::uint64_t seed = 2 * patch.first;
+  for (const Group& group : sum_up(patch.points, owners, clusters)) {
+    const std::size_t count = std::min<std::size_t>(kLitPoints, group.members.size());
+    SurfaceDetail detail;
+    std::vector<double> light(count);
+    bool seen = false;
+    for (const bool front : {true, false}) {
+      if (!front && sides_of(scene_.mesh(), patch.points[group.nearest].triangle) == 1) break;
+      detail.area += group.area;
+      for (std::size_t i = 0; i < count; ++i) {
+        const SurfaceHit at = lit_place(group, patch.points, i, count);
+        const Arriving arriving = look_at(at, front, kLitPoints * seed + i);
+        seen |= arriving.place == Place::seen;
+        const glm::vec3 leaving = finite_or_black(at.albedo / kPi * arriving.light) +
+                                  (front ? finite_or_black(at.emission) : glm::vec3(0));
+        light[i] += static_cast<double>(leaving.x + leaving.y + leaving.z) / 3;
+      }
+      ++seed;
+    }
+    if (!seen) continue;
+    // Sum up
+    double square = 0;
+    for (const double at : light) {
+      detail.light += at / static_cast<double>(count);
+      square += at * at / static_cast<double>(count);
+    }
+    detail.contrast = std::sqrt(std::max(0.0, square - detail.light * detail.light));
+    const double straight = glm::length(group.normal) / static_cast<double>(group.members.size());
+    detail.turn = std::sqrt(2 * std::max(0.0, 1 - straight));
+    for (std::size_t i = 0; i < group.members.size(); i += group.members.size() / kPlaces + 1) {
+      detail.places.push_back(scene_.mesh().origin +
+                              glm::dvec3(patch.points[group.members[i]].position));
+    }
+    details.push_back(std::move(detail));
+  }
+  return details;
 }
 
 std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {

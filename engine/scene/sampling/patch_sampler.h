@@ -18,6 +18,15 @@ namespace ptc {
 /// Returns how many sides of a triangle count: two where its material is double-sided.
 [[nodiscard]] double sides_of(const Mesh& mesh, std::uint32_t triangle);
 
+/// How a stretch of surface turns, and how its light changes.
+struct SurfaceDetail {
+  std::vector<glm::dvec3> places;  ///< some of its points, scene units
+  double area = 0;                 ///< of all sides, scene units squared
+  double turn = 0;   ///< root mean square of the angles between normals and their mean, rad, about
+  double light = 0;  ///< radiance that leaves it, mean of its points, sides and R, G, B
+  double contrast = 0;  ///< standard deviation of that over the points
+};
+
 /// Groups the points of a patch, and makes a surfel of each group.
 ///
 ///     surface of a patch      16 points a surfel      groups of points       one surfel each
@@ -56,6 +65,11 @@ class PatchSampler {
   /// @param patch  has kPointsPerSurfel points for each surfel
   [[nodiscard]] std::vector<Surfel> sample(const SurfacePatch& patch) const;
 
+  /// Measures the groups of a patch, but for those of which no surfel would come.
+  /// @param patch  as for sample()
+  /// @pre there is a light
+  [[nodiscard]] std::vector<SurfaceDetail> look_closely(const SurfacePatch& patch) const;
+
   /// Says whether a side of a place on the surface is likely to get a surfel: whether light reaches
   /// it, or it is not buried.
   /// @pre there is a light
@@ -69,6 +83,10 @@ class PatchSampler {
                                           const std::vector<Cluster>& clusters) const;
   [[nodiscard]] Surfel place(const Group& group, const SurfacePoint& nearest,
                              const Cluster& cluster) const;
+  /// Returns one of the places of a group that light is traced from.
+  /// @param index  below `count`
+  [[nodiscard]] SurfaceHit lit_place(const Group& group, std::span<const SurfacePoint> points,
+                                     std::size_t index, std::size_t count) const;
   [[nodiscard]] std::optional<glm::vec3> reflected(const Group& group,
                                                    std::span<const SurfacePoint> points, float side,
                                                    std::uint64_t seed) const;

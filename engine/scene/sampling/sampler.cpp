@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/base/error.h"
+#include "engine/scene/sampling/adapted_spacing.h"
 #include "engine/scene/sampling/patch_sampler.h"
 #include "engine/scene/sampling/patch_stream.h"
 #include "engine/scene/sampling/places_by_area.h"
@@ -27,22 +28,41 @@ class MeshSource final : public PatchStream {
              const Executor& executor, unsigned at_once, std::uint32_t first)
       : PatchStream(executor, at_once),
         sampler_(scene, &light, options.lights, options.keeps_dark),
-        field_(with_spacing(options, options.spacing > 0
-                                         ? sampled_area(scene.mesh())
-                                         : seen_area(light, scene, options.lights, executor))),
-        patches_(scene.mesh(), field_, kPatchSurfels, first) {}
+        field_({.spacing = 1}) {
+    const SamplingOptions known = with_spacing(
+        options, options.spacing > 0 ? sampled_area(scene.mesh())
+                                     : seen_area(light, scene, options.lights, executor));
+    if (known.adapts) map_ = adapted_spacing(sampler_, scene, known.spacing, first, executor);
+    field_ = SpacingField(known, map_ ? &*map_ : nullptr);
+    patches_.emplace(scene.mesh(), field_, kPatchSurfels, first);
+    if (map_) keep_number(scene.mesh(), known, first);
+  }
 
  private:
-  [[nodiscard]] std::size_t patches() const override { return patches_.size(); }
+  /// Scales the map so that there are as many surfels as an even spacing makes. A map alone makes
+  /// more, because a piece of surface has the finest spacing that is asked for in it.
+  void keep_number(const Mesh& mesh, const SamplingOptions& options, std::uint32_t first) {
+    constexpr int kRounds = 3;
+    const SpacingField even(options);
+    const auto wanted =
+        static_cast<double>(SurfacePatches(mesh, even, kPatchSurfels, first).surfels());
+    for (int i = 0; i < kRounds && patches_->surfels() > 0; ++i) {
+      map_->scale(std::sqrt(static_cast<double>(patches_->surfels()) / wanted));
+      patches_.emplace(mesh, field_, kPatchSurfels, first);
+    }
+  }
+
+  [[nodiscard]] std::size_t patches() const override { return patches_->size(); }
 
   [[nodiscard]] SampledPatch make(std::size_t index) const override {
-    const SurfacePatch patch = patches_.spread(index, PatchSampler::kPointsPerSurfel);
+    const SurfacePatch patch = patches_->spread(index, PatchSampler::kPointsPerSurfel);
     return {sampler_.sample(patch), patch.area};
   }
 
   PatchSampler sampler_;
+  std::optional<SpacingMap> map_;
   SpacingField field_;
-  SurfacePatches patches_;
+  std::optional<SurfacePatches> patches_;
 };
 
 }  // namespace
@@ -90,9 +110,10 @@ double spacing_for(const Mesh& mesh, std::uint64_t count) {
   return std::sqrt(sampled_area(mesh) / static_cast<double>(count));
 }
 
-std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
+std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels, bool adapts,
                              unsigned at_once) noexcept {
-  return 24 * std::max(triangles, surfels / 1000) + kSampledPatchBytes * at_once;
+  return 24 * std::max(triangles, surfels / 1000) + (adapts ? kAdaptingBytes * surfels : 0) +
+         kSampledPatchBytes * at_once;
 }
 
 std::unique_ptr<PointSource> sample_mesh(const DirectLight& light, const RayScene& scene,

@@ -20,6 +20,10 @@ struct SamplingOptions {
   /// Surfels wanted when `spacing` is 0. The result is within 2 % of it, less the surfels that are
   /// buried and left out; of double-sided materials these are made up for, within some 5 %.
   std::uint64_t count = 2'000'000;
+  /// Makes the spacing finer where the surface turns or its light changes, and wider elsewhere; the
+  /// number of surfels stays about that of an even spacing (adapted_spacing.h). Of meshes in memory
+  /// alone.
+  bool adapts = false;
   /// A camera in whose view the spacing is finer where it looks close.
   std::optional<Camera> camera;
   float pixels_per_surfel = 1;  ///< maximum distance between neighbours in that view, pixels
@@ -83,9 +87,11 @@ inline constexpr double kLeastSeen = 0.05;
 /// The bytes that a patch takes while its surfels are made.
 inline constexpr std::uint64_t kSampledPatchBytes = std::uint64_t{20} << 20;
 /// Returns the bytes that sampling takes in addition to the mesh: 24 for each triangle or for each
-/// thousand surfels, whichever are more, and kSampledPatchBytes for each patch.
+/// thousand surfels, whichever are more, and kSampledPatchBytes for each patch; where the spacing
+/// adapts, kAdaptingBytes for each surfel, too.
+/// @param adapts   as in SamplingOptions
 /// @param at_once  as for sample_mesh(), above 0
 [[nodiscard]] std::uint64_t sampling_bytes(std::uint64_t triangles, std::uint64_t surfels,
-                                           unsigned at_once) noexcept;
+                                           bool adapts, unsigned at_once) noexcept;
 
 }  // namespace ptc

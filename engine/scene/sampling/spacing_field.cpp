@@ -16,8 +16,10 @@ constexpr double kEnlarge = 1.1;
 
 }  // namespace
 
-SpacingField::SpacingField(const SamplingOptions& options)
-    : spacing_(options.spacing), finest_(options.spacing * static_cast<double>(options.finest)) {
+SpacingField::SpacingField(const SamplingOptions& options, const SpacingMap* map)
+    : map_(map),
+      spacing_(options.spacing),
+      finest_(options.spacing * static_cast<double>(options.finest)) {
   if (!options.camera) return;
   const Camera& camera = *options.camera;
   angle_ =
@@ -42,9 +44,10 @@ bool SpacingField::is_in_view(const glm::dvec3& centre, double radius) const {
 }
 
 double SpacingField::at(const glm::dvec3& centre, double radius) const {
-  if (angle_ == 0 || !is_in_view(centre, radius)) return spacing_;
+  const double spacing = map_ ? map_->at(centre, radius) : spacing_;
+  if (angle_ == 0 || !is_in_view(centre, radius)) return spacing;
   const double distance = std::max(0.0, glm::distance(centre, eye_) - radius);
-  return std::clamp(distance * angle_, finest_, spacing_);
+  return std::min(std::max(distance * angle_, finest_), spacing);
 }
 
 }  // namespace ptc
