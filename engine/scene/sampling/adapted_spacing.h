@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "engine/base/executor.h"
 #include "engine/scene/ray_scene.h"

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "engine/base/error.h"
@@ -43,11 +44,14 @@ class MeshSource final : public PatchStream {
   /// more, because a piece of surface has the finest spacing that is asked for in it.
   void keep_number(const Mesh& mesh, const SamplingOptions& options, std::uint32_t first) {
     constexpr int kRounds = 3;
+    constexpr double kClose = 0.01;
     const SpacingField even(options);
     const auto wanted =
         static_cast<double>(SurfacePatches(mesh, even, kPatchSurfels, first).surfels());
-    for (int i = 0; i < kRounds && patches_->surfels() > 0; ++i) {
-      map_->scale(std::sqrt(static_cast<double>(patches_->surfels()) / wanted));
+    for (int i = 0; i < kRounds; ++i) {
+      const double share = static_cast<double>(patches_->surfels()) / wanted;
+      if (std::abs(share - 1) < kClose || !(share > 0)) return;
+      map_->scale(std::sqrt(share));
       patches_.emplace(mesh, field_, kPatchSurfels, first);
     }
   }
