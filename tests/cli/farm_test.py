@@ -122,7 +122,7 @@ class Farm(ProgramTest):
     def test_a_task_waits_for_those_before_it(self):
         self.plan("--city", "30k")
         message = run("ptcfarm", "part", self.here / "farm.json", "--number", "1")
-        self.assertEqual(message.returncode, 1)
+        self.assertEqual(message.returncode, 3)
         self.assertIn("part.1 needs route.0, which is not done", message.stderr)
 
     def test_a_failed_task_is_told_and_run_again(self):
@@ -159,6 +159,72 @@ class Farm(ProgramTest):
         self.assertGreaterEqual(facts["skipped"], 2)
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
         self.assertEqual([p.name for p in (self.here / "farm.parts").iterdir() if ".tmp-" in p.name], [])
+
+    def start_task(self, task, *before):
+        """Starts a task as a process, which `before` may start in surroundings of its own."""
+        words = [*before, str(BIN / task["command"][0]), *task["command"][1:]]
+        return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def end_well(self, *processes):
+        for process in processes:
+            _, errors = process.communicate(timeout=100)
+            self.assertEqual(process.returncode, 0, errors)
+
+    def farm_files(self):
+        """The bytes of the scene and of what lies in its folder, but for marks and logs."""
+        folder = self.here / "farm.parts"
+        return {path.name: path.read_bytes() for path in [self.here / "farm.ptcx", *folder.iterdir()] if path.is_file()}
+
+    def test_two_processes_of_each_task_at_once_end_well_with_the_same_bytes(self):
+        self.plan("--city", "120k", parts=3)
+        self.run_plan()
+        alone = self.farm_files()
+        surroundings = [[]]
+        own_numbers = ["unshare", "--pid", "--fork"]  # each process is number 1, as on two machines
+        if shutil.which("unshare") and subprocess.run([*own_numbers, "true"], capture_output=True).returncode == 0:
+            surroundings.append(own_numbers)
+        for before in surroundings:
+            with self.subTest(before):
+                shutil.rmtree(self.here / "farm.parts")
+                (self.here / "farm.ptcx").unlink()
+                for task in self.plan("--city", "120k", parts=3)["tasks"]:
+                    self.end_well(*(self.start_task(task, *before) for _ in range(3)))
+                self.assertEqual(self.farm_files(), alone)
+
+    def test_a_second_process_that_is_late_ends_well_and_leaves_nothing(self):
+        tasks = {task["name"]: task for task in self.plan("--city", "120k", parts=2)["tasks"]}
+        self.run_plan()
+        alone = self.farm_files()
+        for name in tasks:
+            for done in ("route.0", "part.0", "part.1", "join"):
+                (self.here / "farm.parts" / "done" / done).unlink()
+            for before in tasks[name]["after"] and (["route.0"] if name != "join" else ["route.0", "part.0", "part.1"]):
+                self.end_well(self.start_task(tasks[before]))
+            late = self.start_task(tasks[name], "sh", "-c", 'kill -STOP $$; exec "$@"', "sh")
+            os.waitid(os.P_PID, late.pid, os.WSTOPPED | os.WNOWAIT)
+            late.send_signal(signal.SIGCONT)
+            time.sleep(0.004)  # somewhere in its work
+            late.send_signal(signal.SIGSTOP)
+            self.run_plan()
+            late.send_signal(signal.SIGCONT)
+            self.end_well(late)
+            self.assertEqual(self.farm_files(), alone, name)
+
+    def test_join_removes_what_killed_tasks_left_and_nothing_of_a_task_that_runs(self):
+        self.plan("--city", "30k", parts=2)
+        folder = self.here / "farm.parts"
+        folder.mkdir()
+        ended = subprocess.Popen(["true"])
+        ended.wait()
+        host = re.sub("[^0-9a-zA-Z.]", "_", os.uname().nodename[:48])
+        left = [f".0.ptcx.tmp-{host}-{ended.pid}-01234567-0", ".0.ptcx.tmp-elsewhere-7-01234567-1"]
+        kept = [f".0.ptcx.tmp-{host}-{os.getpid()}-01234567-0", ".0.ptcx.tmp-elsewhere-7-01234567-0", ".0.ptcx.tmp-x"]
+        for name in left + kept:
+            (folder / name).write_text("some")
+        old = time.time() - 25 * 3600
+        os.utime(folder / left[1], (old, old))
+        self.run_plan()
+        self.assertEqual(sorted(name for name in os.listdir(folder) if ".tmp-" in name), sorted(kept))
 
     def export(self, scheduler, name):
         self.succeed("ptcfarm", "export", self.here / "farm.json", "--for", scheduler, "-o", self.here / name)

@@ -14,6 +14,7 @@
 #include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
 #include "engine/io/file/state_file.h"
+#include "engine/io/file/temporary_name.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/rounding.h"
 #include "engine/parallel/thread_pool.h"
@@ -47,8 +48,10 @@ void mark_done(const FarmPlan& plan, const FarmTask& task) {
   StateWriter state;
   state.put(plan.id);
   state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
-  write_state(done_mark(plan, task), state.take());
+  write_shared_state(done_mark(plan, task), state.take());
 }
+
+bool parts_are_done(const FarmPlan& plan);
 
 /// Says whether a task is done. One whose output is gone is not, but for routes that no part needs
 /// any more.
@@ -59,9 +62,13 @@ bool is_done(const FarmPlan& plan, const FarmTask& task) {
   StateReader state(bytes, mark.string());
   if (state.get<std::uint64_t>() != plan.id) return false;
   if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
-  return task.kind == TaskKind::route && std::ranges::all_of(plan.tasks, [&](const auto& other) {
-           return other.kind != TaskKind::part || is_done(plan, other);
-         });
+  return task.kind == TaskKind::route && parts_are_done(plan);
+}
+
+bool parts_are_done(const FarmPlan& plan) {
+  return std::ranges::all_of(plan.tasks, [&](const FarmTask& task) {
+    return task.kind != TaskKind::part || is_done(plan, task);
+  });
 }
 
 /// Sends the points of one input to their ranges.
@@ -179,9 +186,9 @@ class Part {
   void run() {
     open_routes();
     const std::uint64_t points = count();
-    std::filesystem::remove(edges_path(target_));
     if (points == 0) {  // a scene has no part without points
       std::filesystem::remove(target_);
+      std::filesystem::remove(edges_path(target_));
       return;
     }
     progress_.begin("sort", points, "points");
@@ -311,15 +318,15 @@ class Part {
   std::optional<AttributeSorts> sorts_;
 };
 
-/// Removes what the routes wrote, and temporary files that killed tasks have left.
+/// Removes what the routes wrote, and temporary files that killed tasks have left. A second process
+/// of a task that is done may still need them: its task ends well for all that (run_task()).
 void remove_leftovers(const FarmPlan& plan) {
   std::error_code gone;
   for (const FarmTask& task : plan.tasks) {
     if (task.kind == TaskKind::route) std::filesystem::remove(task.outputs.at(0), gone);
   }
   for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
-    if (entry.path().filename().string().find(".tmp-") != std::string::npos)
-      std::filesystem::remove(entry.path(), gone);
+    if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
   }
 }
 
@@ -347,6 +354,18 @@ void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
   }
 }
 
+/// Refuses a task before its time. What other machines have written may come into view late, so
+/// this is worth another try.
+void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
+  for (const std::string& name : task.after) {
+    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
+    if (before != plan.tasks.end() && is_done(plan, *before)) continue;
+    throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again),
+                            plan.file.string() + ": " + task.name() + " needs " + name +
+                                ", which is not done, or not seen from this machine yet");
+  }
+}
+
 }  // namespace
 
 TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
@@ -371,20 +390,19 @@ void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string&
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {
   if (is_done(plan, task)) return false;
-  for (const std::string& name : task.after) {
-    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
-    if (before == plan.tasks.end() || !is_done(plan, *before))
-      throw DataError(plan.file.string() + ": " + task.name() + " needs " + name +
-                      ", which is not done");
-  }
+  require_forerunners(plan, task);
   std::filesystem::remove(failed_mark(plan, task));
   try {
     perform(plan, task, run, progress);
   } catch (const std::exception& error) {
+    // Another process may have done the task in the meantime, and join removed what this one needed
+    if (is_done(plan, task)) return false;
     note_failure(plan, task, error.what());
     throw;
   }
   mark_done(plan, task);
+  if (task.kind == TaskKind::route && parts_are_done(plan))
+    std::filesystem::remove(task.outputs.at(0));  // a second process of it was later than the parts
   return true;
 }
 

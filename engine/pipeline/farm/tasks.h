@@ -21,9 +21,13 @@ enum class TaskState { waiting, failed, done };
 void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
 
 /// Runs a task, unless it is done, and marks it as done or failed.
+///
+/// Processes that run one task at the same time, on one machine or on several, do no harm: each
+/// writes under a name of its own, all publish the same bytes, and one that fails after another has
+/// done the task ends well.
 /// @param run  the resources of the task
-/// @return  false when it was done before
-/// @throws DataError when a task that must be done before is not; as the task
+/// @return  false when it was done before, or by another process
+/// @throws std::system_error (EAGAIN) when a task that must be done before is not; as the task
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress);
 

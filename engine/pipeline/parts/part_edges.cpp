@@ -81,7 +81,7 @@ void write_edges(const std::filesystem::path& part, std::uint64_t superblock_xxh
   StateWriter state;
   state.put(superblock_xxh3);
   edges.save(state);
-  write_state(edges_path(part), state.take());
+  write_shared_state(edges_path(part), state.take());
 }
 
 TreeEdges edges_of(const ContainerReader& part, const Executor& executor) {
