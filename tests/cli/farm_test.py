@@ -140,6 +140,7 @@ class Farm(ProgramTest):
         self.assertIn(str(cloud), status["states"][0]["error"])
         self.assertIn(str(cloud), self.succeed("ptcfarm", "status", self.here / "farm.json").stdout)
         cloud.write_bytes(whole)
+        self.plan(cloud)
         self.run_plan()
         status = self.succeed("ptcfarm", "status", self.here / "farm.json").stdout
         self.assertRegex(status, r"^\[#{30}\] 100 %, \d+ of \d+ tasks done, 0 failed")
@@ -342,13 +343,62 @@ class Farm(ProgramTest):
         write_ply(cloud, ball(900))
         message = run("ptcfarm", "route", self.here / "farm.json")
         self.assertEqual(message.returncode, 1)
-        self.assertIn(f"{cloud}: the file changed since it was planned: plan again", message.stderr)
+        self.assertIn(f"{cloud}: the file changed since it was planned: ", message.stderr)
+
+    def test_an_input_that_was_changed_in_place_is_refused(self):
+        """Each change leaves the number of points and their channels as they were."""
+        cloud, scene, parts = self.here / "c.ply", self.here / "s.ptcx", self.here / "p.ptcx"
+        points = ball(3000)
+        write_ply(cloud, points)
+        self.succeed("ptcbuild", cloud, "-o", scene)
+        self.succeed("ptcfarm", "plan", cloud, "--parts", 2, "-o", self.here / "p.json")
+        self.succeed("ptcfarm", "run", self.here / "p.json")
+
+        def relight():
+            lit = self.here / "lit.ptcx"
+            self.succeed("ptcbuild", cloud, "--sun", "0,1,0", "-o", lit)
+            lit.replace(scene)
+
+        def write_later():
+            cloud.write_bytes(cloud.read_bytes())
+
+        def change(offset):
+            whole, times = bytearray(cloud.read_bytes()), cloud.stat()
+            whole[offset] ^= 1
+            cloud.write_bytes(whole)
+            os.utime(cloud, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+        def change_part():
+            self.succeed("ptcbuild", cloud, "--profile", "exact", "-o", self.here / "p.parts" / "0.ptcx")
+
+        for source, named, act, said in ((scene, scene, relight, "its content is another one"),
+                                         (cloud, cloud, lambda: change(2000), "its content is another one"),
+                                         (cloud, cloud, lambda: change(-4), "its content is another one"),
+                                         (cloud, cloud, write_later, "it was written since"),
+                                         (parts, self.here / "p.parts" / "0.ptcx", change_part, "bytes and has")):
+            with self.subTest(source=source, said=said):
+                before = self.plan(source)
+                same = source.read_bytes()
+                if source.suffix == ".ptcx":  # a copy of the same bytes is the same
+                    source.unlink()
+                    source.write_bytes(same)
+                    self.succeed("ptcfarm", "route", self.here / "farm.json")
+                    shutil.rmtree(self.here / "farm.parts")
+                act()
+                message = run("ptcfarm", "route", self.here / "farm.json")
+                self.assertEqual(message.returncode, 1, message.stderr)
+                self.assertIn(f"{named}: the file changed since it was planned: ", message.stderr)
+                self.assertIn(said, message.stderr)
+                self.assertIn("plan again", message.stderr)
+                self.assertFalse((self.here / "farm.parts" / "route.0").exists())
+                if source != parts:  # a plan of the new file is another plan
+                    self.assertNotEqual(self.plan(source)["inputs"], before["inputs"])
 
     def test_other_or_damaged_plans_are_refused(self):
         path = self.here / "farm.json"
         self.plan("--city", "30k")
         text = path.read_text()
-        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 1", "ptcfarm plan 2"),
+        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 2", "ptcfarm plan 1"),
                         text.replace('"kind": "join"', '"kind": "frob"'), text.replace('"points"', '"dots"')):
             path.write_text(changed)
             result = run("ptcfarm", "status", path)

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,11 +14,9 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
-#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/farm/cuts.h"
 #include "engine/pipeline/farm/plan_json.h"
 #include "engine/pipeline/scene_record.h"
-#include "engine/store/reader.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
 
@@ -63,17 +60,6 @@ bool lies_in(const std::filesystem::path& file, const std::filesystem::path& fol
   };
   return below(std::filesystem::weakly_canonical(file)) ||
          below(std::filesystem::weakly_canonical(directory_of(file)));
-}
-
-/// Returns an input, and the parts of a scene of parts.
-std::vector<std::filesystem::path> files_of(const std::filesystem::path& input) {
-  std::vector<std::filesystem::path> files{input};
-  if (!std::filesystem::is_regular_file(input) || !is_container(input)) return files;
-  const ContainerReader container(input, ContainerReader::OpenParts::no);
-  if (!container.header().has_parts()) return files;
-  const PartList list = container.read_parts();
-  for (const PartRecord& part : list.parts()) files.push_back(directory_of(input) / part.name);
-  return files;
 }
 
 /// Says whether a path has characters that end a line of a script or a table.
@@ -329,6 +315,11 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                 .scene = std::filesystem::absolute(scene),
                 .request = request};
   check_paths(request, plan);
+  std::map<std::filesystem::path, std::vector<InputState>> states;
+  for (const std::filesystem::path& input : request.inputs) {
+    const std::filesystem::path path = std::filesystem::absolute(input);
+    states[path] = states_of(path);
+  }
   const MeshLimits limits{.reading = request.run.memory_bytes,
                           .kept = request.run.memory_bytes,
                           .traced = request.run.memory_bytes,
@@ -347,6 +338,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                          "a farm builds clouds where they are: build scene files on one "
                          "machine");
     plan.inputs.push_back({.path = std::filesystem::absolute(cloud.path),
+                           .states = states[std::filesystem::absolute(cloud.path)],
                            .points = cloud.points,
                            .channels = cloud.channels,
                            .taken = cloud.taken});
@@ -364,6 +356,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
       sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
   add_tasks(plan, options.memory_bytes);
+  for (const FarmInput& input : plan.inputs) require_unchanged(input.states);
   for (FarmTask& task : plan.tasks) task.command = options.command(plan, task);
   return plan;
 }

@@ -19,6 +19,7 @@
 #include "engine/base/progress.h"
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/farm/input_state.h"
 #include "engine/pipeline/farm/range_file.h"
 #include "engine/scene/procedural/city.h"
 #include "format/morton.h"
@@ -50,11 +51,12 @@ struct FarmTask {
 /// What a task of the kind route takes: a cloud of the plan, as it was measured, or some blocks of
 /// the city.
 struct FarmInput {
-  std::filesystem::path path;     ///< empty: the city
-  CityBlocks blocks;              ///< of the city
-  std::uint64_t points = 0;       ///< of the city, about
-  std::vector<Channel> channels;  ///< in the order of its rows
-  std::vector<bool> taken;        ///< as for AttributePlan::add_input()
+  std::filesystem::path path;      ///< empty: the city
+  std::vector<InputState> states;  ///< of the file and its parts, before it was measured
+  CityBlocks blocks;               ///< of the city
+  std::uint64_t points = 0;        ///< of the city, about
+  std::vector<Channel> channels;   ///< in the order of its rows
+  std::vector<bool> taken;         ///< as for AttributePlan::add_input()
 };
 
 struct FarmPlan;
@@ -103,7 +105,7 @@ struct FarmPlan {
 /// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
 ///         light clouds, and for fields that a farm does not take; when the scene or the plan is an
 ///         input or a part of one, when one lies in the folder of the parts, and for paths with
-///         control characters; as build_container()
+///         control characters; DataError when an input changes meanwhile; as build_container()
 [[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
                                  const std::filesystem::path& file, const FarmOptions& options,
                                  Progress& progress);

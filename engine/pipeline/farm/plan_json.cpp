@@ -10,7 +10,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr char kFormat[] = "ptcfarm plan 1";
+constexpr char kFormat[] = "ptcfarm plan 2";
 
 OrderedJson to_json(const std::filesystem::path& path) {
   return path.string();
@@ -63,6 +63,28 @@ std::vector<Channel> channels_of(const OrderedJson& json) {
   std::vector<Channel> channels;
   for (const OrderedJson& channel : json) channels.push_back(channel_of(channel));
   return channels;
+}
+
+OrderedJson to_json(const std::vector<InputState>& states) {
+  OrderedJson list = OrderedJson::array();
+  for (const InputState& state : states) {
+    list.push_back({{"path", state.path.string()},
+                    {"bytes", state.bytes},
+                    {"modified_ns", state.modified_ns},
+                    {"xxh3", state.xxh3}});
+  }
+  return list;
+}
+
+std::vector<InputState> states_of(const OrderedJson& json) {
+  std::vector<InputState> states;
+  for (const OrderedJson& state : json) {
+    states.push_back({.path = state.at("path").get<std::string>(),
+                      .bytes = state.at("bytes"),
+                      .modified_ns = state.at("modified_ns"),
+                      .xxh3 = state.at("xxh3")});
+  }
+  return states;
 }
 
 OrderedJson to_json(const BuildRequest& request) {
@@ -159,6 +181,7 @@ FarmPlan plan_of(const OrderedJson& json) {
   for (const OrderedJson& input : json.at("inputs")) {
     plan.inputs.push_back(
         {.path = input.at("path").get<std::string>(),
+         .states = states_of(input.at("files")),
          .blocks = {.first = input.at("blocks").at(0), .end = input.at("blocks").at(1)},
          .points = input.at("points"),
          .channels = channels_of(input.at("channels")),
@@ -178,6 +201,7 @@ std::string plan_to_json(const FarmPlan& plan) {
               tasks = OrderedJson::array();
   for (const FarmInput& input : plan.inputs) {
     inputs.push_back({{"path", input.path.string()},
+                      {"files", to_json(input.states)},
                       {"blocks", {input.blocks.first, input.blocks.end}},
                       {"points", input.points},
                       {"channels", to_json(input.channels)},

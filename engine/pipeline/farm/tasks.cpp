@@ -90,12 +90,14 @@ class Route {
     if (input.path.empty()) {
       feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput);
     } else {
+      require_unchanged(input.states);
       for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
       const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
       require_planned(file.info.channels == input.channels);
       const std::uint64_t before = points_;
       feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
       require_planned(points_ - before == input.points);
+      require_unchanged(input.states);  // nor while it was read
     }
     writer_.finish();
     progress_.end();
