@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "tools/farm_retry.h"
+
 namespace ptc {
 namespace {
 
@@ -86,7 +88,7 @@ std::string array_of(const FarmPlan& plan, std::span<const FarmTask* const> task
       "{7} --threads \"${{SLURM_CPUS_PER_TASK:-1}}\" && exit 0\n"
       "code=$?\n"
       "# What the machine refused may work on another one\n"
-      "if [ $code -ge 3 ] && [ $code -ne 5 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 2 ]; then\n"
+      "if {{ {8}; }} && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt {9} ]; then\n"
       "  scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n"
       "fi\n"
       "exit $code\n"
@@ -94,7 +96,8 @@ std::string array_of(const FarmPlan& plan, std::span<const FarmTask* const> task
       ")\n",
       name, quoted(plan.scene.stem().string() + "." + name), tasks.size() - 1, mebibytes(first),
       static_cast<int>(std::ceil(seconds / 6)) + 5, quoted(log),
-      after.empty() ? "" : " --dependency=afterok" + after, line_of(first, number));
+      after.empty() ? "" : " --dependency=afterok" + after, line_of(first, number),
+      shell_worth_retry("code"), kMaxRetries);
 }
 
 std::string for_slurm(const FarmPlan& plan) {

@@ -193,6 +193,7 @@ ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progres
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["ran"] = done.ran;
   outcome.facts["skipped"] = done.skipped;
+  outcome.facts["retried"] = done.retried;
   outcome.facts["failed"] = done.failed;
   outcome.exit_code = static_cast<ptc::ExitCode>(done.exit_code);
   outcome.summary = done.failed.empty() ? fmt::format("{}: {} tasks ran, {} were done before\n",

@@ -192,25 +192,6 @@ class Farm(ProgramTest):
                     self.end_well(*(self.start_task(task, *before) for _ in range(3)))
                 self.assertEqual(self.farm_files(), alone)
 
-    def test_a_second_process_that_is_late_ends_well_and_leaves_nothing(self):
-        tasks = {task["name"]: task for task in self.plan("--city", "120k", parts=2)["tasks"]}
-        self.run_plan()
-        alone = self.farm_files()
-        for name in tasks:
-            for done in ("route.0", "part.0", "part.1", "join"):
-                (self.here / "farm.parts" / "done" / done).unlink()
-            for before in tasks[name]["after"] and (["route.0"] if name != "join" else ["route.0", "part.0", "part.1"]):
-                self.end_well(self.start_task(tasks[before]))
-            late = self.start_task(tasks[name], "sh", "-c", 'kill -STOP $$; exec "$@"', "sh")
-            os.waitid(os.P_PID, late.pid, os.WSTOPPED | os.WNOWAIT)
-            late.send_signal(signal.SIGCONT)
-            time.sleep(0.004)  # somewhere in its work
-            late.send_signal(signal.SIGSTOP)
-            self.run_plan()
-            late.send_signal(signal.SIGCONT)
-            self.end_well(late)
-            self.assertEqual(self.farm_files(), alone, name)
-
     def test_join_removes_what_killed_tasks_left_and_nothing_of_a_task_that_runs(self):
         self.plan("--city", "30k", parts=2)
         folder = self.here / "farm.parts"
@@ -420,6 +401,67 @@ class Farm(ProgramTest):
         self.assertIn("--output is required", self.fail_with(2, "ptcfarm", "plan", self.scene))
         self.assertIn("takes one plan", self.fail_with(2, "ptcfarm", "run"))
         self.assertIn("needs a value", self.fail_with(2, "ptcfarm", "plan", self.scene, "-o"))
+
+    def children(self, pid):
+        return [int(name) for name in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+    def begin_run(self, *options):
+        """Starts a run and waits until a task of it runs. Returns both."""
+        process = subprocess.Popen([BIN / "ptcfarm", "run", self.here / "farm.json", *options], text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(process.kill)
+        while not (running := self.children(process.pid)):
+            self.assertIsNone(process.poll())
+        return process, running[0]
+
+    def test_a_task_that_a_signal_ends_is_run_again_a_bounded_number_of_times(self):
+        self.plan("--city", "400k", parts=2)
+        process, task = self.begin_run("--json", "--threads", "1")
+        os.kill(task, signal.SIGKILL)
+        output, errors = process.communicate(timeout=100)
+        facts = json.loads(output)
+        self.assertEqual((process.returncode, facts["retried"], facts["failed"]), (0, 1, []), errors)
+        # What the system refuses each time: a folder has the name of a part
+        self.plan("--city", "30k", parts=1)
+        (self.here / "farm.parts" / "0.ptcx").unlink()
+        (self.here / "farm.parts" / "0.ptcx").mkdir()
+        failed = run("ptcfarm", "run", self.here / "farm.json", "--json")
+        self.assertEqual(failed.returncode, 3, failed.stderr)
+        self.assertEqual(json.loads(failed.stdout)["retried"], 2)
+        # Bad input is the same each time
+        self.plan(self.cloud)
+        (self.here / "farm.parts" / "route.0").write_bytes(b"none")
+        (self.here / "farm.parts" / "done" / "route.0").write_bytes(b"none")
+        failed = run("ptcfarm", "run", self.here / "farm.json", "--json")
+        self.assertEqual(failed.returncode, 1, failed.stderr)
+
+    def test_slurm_and_a_run_agree_on_what_is_worth_another_try(self):
+        self.plan("--city", "8k", parts=1)
+        script = self.export("slurm", "farm.sh").read_text()
+        condition, = set(re.findall(r"if \{ (.*); \} && \[ .*RESTART_COUNT:-0\}\" -lt 2 \]", script))
+        loop = f"for code in $(seq 0 255); do if {condition}; then echo $code; fi; done"
+        codes = subprocess.run(["sh", "-c", loop], capture_output=True, text=True).stdout.split()
+        self.assertEqual([int(code) for code in codes], [3, *range(129, 256)])
+
+    def test_tasks_end_with_the_run_that_is_killed(self):
+        self.plan("--city", "2M", parts=1)
+        process, task = self.begin_run("--threads", "1")
+        process.kill()
+        process.communicate()
+        end = time.time() + 10
+        while Path(f"/proc/{task}").exists() and "Z" not in Path(f"/proc/{task}/stat").read_text().split()[2]:
+            self.assertLess(time.time(), end, "the task goes on")
+            time.sleep(0.01)
+        self.assertEqual([name for name in os.listdir(self.here / "farm.parts") if ".tmp-" in name], [])
+
+    def test_a_cap_that_no_task_can_run_under_is_refused_by_the_plan(self):
+        least = "16M"
+        for kind in ("a route", "a part"):
+            message = self.fail_with(5, "ptcfarm", "plan", "--city", "30k", "-o", self.here / "farm.json", "--task-memory", least)
+            self.assertIn(f"the memory cap is too small for {kind} of this plan", message)
+            least = re.search(r"the least that works is (\d+M)", message)[1]
+        self.succeed("ptcfarm", "plan", "--city", "30k", "-o", self.here / "farm.json", "--task-memory", least)
+        self.succeed("ptcfarm", "run", self.here / "farm.json", "--memory", least, "--threads", "64")
 
     def test_a_cap_below_that_of_a_task_is_refused(self):
         self.plan("--city", "30k")

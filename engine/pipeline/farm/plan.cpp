@@ -16,6 +16,7 @@
 #include "engine/pipeline/build/build_record.h"
 #include "engine/pipeline/farm/cuts.h"
 #include "engine/pipeline/farm/plan_json.h"
+#include "engine/pipeline/farm/tasks.h"
 #include "engine/pipeline/scene_record.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
@@ -355,6 +356,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   const std::vector<MortonKey> keys =
       sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
+  require_task_memory(plan, options.memory_bytes);
   add_tasks(plan, options.memory_bytes);
   for (const FarmInput& input : plan.inputs) require_unchanged(input.states);
   for (FarmTask& task : plan.tasks) task.command = options.command(plan, task);

@@ -105,7 +105,8 @@ struct FarmPlan {
 /// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
 ///         light clouds, and for fields that a farm does not take; when the scene or the plan is an
 ///         input or a part of one, when one lies in the folder of the parts, and for paths with
-///         control characters; DataError when an input changes meanwhile; as build_container()
+///         control characters; DataError when an input changes meanwhile; LimitError when the cap
+///         of the tasks is too small; as build_container()
 [[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
                                  const std::filesystem::path& file, const FarmOptions& options,
                                  Progress& progress);

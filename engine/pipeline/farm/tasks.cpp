@@ -71,6 +71,27 @@ bool parts_are_done(const FarmPlan& plan) {
   });
 }
 
+constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
+
+/// Returns the bytes that a route has for its ranges.
+/// @param field  as for MemoryBudget
+std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t cap, const char* field) {
+  MemoryBudget budget(cap, "a route of this plan", field);
+  budget.charge("buffers", kBufferBytes);
+  return budget.rest("the ranges", RangeWriter::least_memory(plan.parts(), plan.row()));
+}
+
+/// Returns the bytes that a part has for its sorts.
+std::uint64_t sorts_bytes(const FarmPlan& plan, std::uint64_t cap, unsigned threads,
+                          const char* field) {
+  MemoryBudget budget(cap, "a part of this plan", field);
+  budget.charge("buffers", kBufferBytes);
+  budget.charge("pages that are written",
+                ContainerWriter::writing_bytes(plan.request.page_shift, threads));
+  budget.charge("node pages that wait", held_pages_bytes(plan.request.page_shift));
+  return budget.rest("the sort", kMinSortBytes * (plan.row().group_bytes.size() + 1));
+}
+
 /// Sends the points of one input to their ranges.
 class Route {
  public:
@@ -82,7 +103,7 @@ class Route {
         attributes_(plan.attributes()),
         values_(attributes_.groups()),
         writer_(plan.output(TaskKind::route, task.number), plan.id, plan.cuts, plan.row(),
-                writer_bytes(run.memory_bytes)) {}
+                ranges_bytes(plan, run.memory_bytes, kCapOfRun)) {}
 
   void run() {
     const FarmInput& input = plan_.inputs[number_];
@@ -109,11 +130,6 @@ class Route {
     if (holds) return;
     throw DataError(plan_.inputs[number_].path.string() +
                     ": the file changed since it was planned: plan again");
-  }
-
-  [[nodiscard]] std::uint64_t writer_bytes(std::uint64_t cap) const {
-    MemoryBudget budget = budget_of(cap, "this route");
-    return budget.rest("the ranges", RangeWriter::least_memory(plan_.parts(), plan_.row()));
   }
 
   /// Returns the input's number among those that have channels.
@@ -181,7 +197,11 @@ class Part {
         number_(task.number),
         target_(plan.output(TaskKind::part, task.number)),
         run_(run),
-        executor_(run.threads),
+        fit_(threads_that_fit(run,
+                              [&](unsigned threads) {
+                                return sorts_bytes(plan, run.memory_bytes, threads, kCapOfRun);
+                              })),
+        executor_(fit_.threads),
         progress_(progress),
         attributes_(plan.attributes()) {}
 
@@ -220,13 +240,8 @@ class Part {
 
   /// Gives the memory to the sorts: those of values get equal shares.
   void sort(std::uint64_t points) {
-    MemoryBudget budget = budget_of(run_.memory_bytes, "this part");
-    budget.charge("pages that are written",
-                  ContainerWriter::writing_bytes(plan_.request.page_shift, executor_.threads()));
-    budget.charge("node pages that wait", held_pages_bytes(plan_.request.page_shift));
     const std::size_t groups = attributes_.groups();
-    const std::uint64_t memory = budget.rest("the sort", kMinSortBytes * (groups + 1));
-    const SortOptions options{.memory_bytes = memory / (groups + 1),
+    const SortOptions options{.memory_bytes = fit_.bytes / (groups + 1),
                               .temp_dirs = temp_dirs(run_, target_),
                               .expected = points,
                               .emits = plan_.emits};
@@ -312,6 +327,7 @@ class Part {
   std::size_t number_;
   std::filesystem::path target_;
   const RunOptions& run_;
+  ThreadsThatFit fit_;  ///< with the bytes of the sorts
   const ThreadPool executor_;
   Progress& progress_;
   AttributePlan attributes_;
@@ -369,6 +385,11 @@ void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
 }
 
 }  // namespace
+
+void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
+  static_cast<void>(ranges_bytes(plan, memory_bytes, kCapOfPlan));
+  static_cast<void>(sorts_bytes(plan, memory_bytes, 1, kCapOfPlan));
+}
 
 TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
   if (is_done(plan, task)) return TaskState::done;
