@@ -21,6 +21,7 @@
 #include "engine/pipeline/farm/tasks.h"
 #include "tools/common.h"
 #include "tools/farm_retry.h"
+#include "tools/farm_status.h"
 
 namespace ptc {
 namespace {
@@ -56,6 +57,7 @@ class Runner {
 
   FarmRun run() {
     std::filesystem::create_directories(plan_.folder() / "log");
+    note_begin(plan_);
     progress_.begin("run", plan_.tasks.size(), "tasks");
     for (const FarmTask& task : plan_.tasks) {
       if (state_of(plan_, task) != TaskState::done) {

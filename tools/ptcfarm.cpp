@@ -3,12 +3,14 @@
 //   plan      inputs --> plan.json
 //   route, part, join    one task of a plan
 //   run       all tasks, on this machine
+//   submit, cancel       all tasks, by Slurm
 //   status    how far they are
 //   export    the tasks for another scheduler
 #include <algorithm>
 #include <span>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "engine/io/file/file.h"
 #include "engine/pipeline/farm/plan.h"
@@ -18,9 +20,11 @@
 #include "tools/common.h"
 #include "tools/farm_export.h"
 #include "tools/farm_run.h"
+#include "tools/farm_status.h"
 #include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/slurm_jobs.h"
 #include "tools/values.h"
 
 namespace {
@@ -46,12 +50,12 @@ constexpr char kExamples[] =
     "  ptcfarm run town.json --memory 8G\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
-    "  # Submit the tasks to Slurm\n"
-    "  ptcfarm export town.json --for slurm -o town.sh\n"
+    "  # Let a cluster run them\n"
+    "  ptcfarm submit town.json --slurm\n"
     "  # See how far the tasks are, and what failed\n"
     "  ptcfarm status town.json\n";
 
-enum class Action { plan, run, status, export_tasks, route, part, join };
+enum class Action { plan, run, submit, cancel, status, export_tasks, route, part, join };
 
 struct Arguments {
   Action action = Action::plan;
@@ -61,6 +65,7 @@ struct Arguments {
   ptc::FarmOptions farm;
   std::size_t number = 0;
   ptc::Scheduler scheduler = ptc::Scheduler::parallel;
+  bool slurm = false;
 };
 
 void declare(ptc::Command& command, Arguments& arguments) {
@@ -69,15 +74,18 @@ void declare(ptc::Command& command, Arguments& arguments) {
   ptc::add_choice<Action>(app, "ACTION", arguments.action,
                           {{"plan", Action::plan},
                            {"run", Action::run},
+                           {"submit", Action::submit},
+                           {"cancel", Action::cancel},
                            {"status", Action::status},
                            {"export", Action::export_tasks},
                            {"route", Action::route},
                            {"part", Action::part},
                            {"join", Action::join}},
-                          "plan, run, status, export, or the kind of a task\n"
+                          "plan, run, submit, cancel, status, export, or the kind of a task\n"
                           "plan measures the inputs and writes a plan. run runs its tasks, those "
-                          "that are done left out. status says how far they are. export writes "
-                          "them for another scheduler. route, part and join run one task.")
+                          "that are done left out. submit has a cluster run them, and cancel ends "
+                          "its jobs. status says how far they are. export writes them for another "
+                          "scheduler. route, part and join run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -124,6 +132,10 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                                   "parallel and slurm are shell scripts: one calls GNU parallel, "
                                   "one submits jobs to Slurm. openjd is a job template of Open Job "
                                   "Description, which other farms take.")
+      ->group(kGroup);
+  app.add_flag("--slurm", arguments.slurm,
+               "Submit to Slurm: an array of jobs for each kind of task\n"
+               "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
                    "Number of the task among those of its kind")
@@ -217,55 +229,31 @@ ptc::Outcome run_one(const Arguments& arguments, ptc::TaskKind kind, ptc::Comman
           fmt::format("{}: {}\n", task->name(), ran ? "done" : "was done before")};
 }
 
-const char* name_of(ptc::TaskState state) {
-  switch (state) {
-    case ptc::TaskState::waiting:
-      return "waiting";
-    case ptc::TaskState::failed:
-      return "failed";
-    case ptc::TaskState::done:
-      break;
-  }
-  return "done";
-}
-
-/// A bar of the share that is done: "[#####.....]".
-std::string bar(double share) {
-  constexpr std::size_t kWidth = 30;
-  const auto full = static_cast<std::size_t>(share * kWidth);
-  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
-}
-
-ptc::Outcome status(const Arguments& arguments) {
+ptc::Outcome submit(const Arguments& arguments) {
+  if (!arguments.slurm) throw CLI::RequiredError("--slurm, the scheduler to submit to,");
   const ptc::FarmPlan plan = only_plan(arguments);
-  std::size_t done = 0, failed = 0;
-  double seconds = 0, left = 0;
-  std::string failures;
-  nlohmann::ordered_json tasks = nlohmann::ordered_json::array();
-  for (const ptc::FarmTask& task : plan.tasks) {
-    const ptc::TaskState state = ptc::state_of(plan, task);
-    const std::string failure =
-        state == ptc::TaskState::failed ? ptc::failure_of(plan, task) : std::string();
-    done += state == ptc::TaskState::done ? 1 : 0;
-    failed += state == ptc::TaskState::failed ? 1 : 0;
-    seconds += task.seconds;
-    left += state == ptc::TaskState::done ? 0 : task.seconds;
-    tasks.push_back({{"name", task.name()}, {"state", name_of(state)}});
-    if (state != ptc::TaskState::failed) continue;
-    tasks.back()["error"] = failure;
-    failures +=
-        fmt::format("{} failed:\n{}{}", task.name(), failure, failure.ends_with('\n') ? "" : "\n");
-  }
+  const std::vector<std::string> jobs = ptc::submit_to_slurm(plan);
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["jobs"] = jobs;
+  outcome.summary = jobs.empty()
+                        ? fmt::format("{}: all tasks are done\n", plan.scene.string())
+                        : fmt::format("{}: jobs {}\n", plan.scene.string(), fmt::join(jobs, ", "));
+  return outcome;
+}
+
+ptc::Outcome cancel(const Arguments& arguments) {
+  const ptc::FarmPlan plan = only_plan(arguments);
+  const std::vector<std::string> jobs = ptc::cancel_in_slurm(plan);
+  const auto done = std::ranges::count_if(plan.tasks, [&](const ptc::FarmTask& task) {
+    return ptc::state_of(plan, task) == ptc::TaskState::done;
+  });
+  const std::size_t left = plan.tasks.size() - static_cast<std::size_t>(done);
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["cancelled"] = jobs;
   outcome.facts["done"] = done;
-  outcome.facts["failed"] = failed;
-  outcome.facts["core_seconds_left"] = left;
-  outcome.facts["states"] = tasks;
-  const double share = seconds > 0 ? (seconds - left) / seconds : 1;
-  outcome.summary = fmt::format(
-      "{} {:.0f} %, {} of {} tasks done, {} failed, about {:.0f} s of "
-      "one core left\n{}",
-      bar(share), 100 * share, done, plan.tasks.size(), failed, left, failures);
+  outcome.facts["left"] = left;
+  outcome.summary = fmt::format("{}: {} jobs cancelled, {} tasks done, {} left\n",
+                                plan.scene.string(), jobs.size(), done, left);
   return outcome;
 }
 
@@ -290,8 +278,12 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
       return plan(arguments, command, progress);
     case Action::run:
       return run(arguments, command, progress);
+    case Action::submit:
+      return submit(arguments);
+    case Action::cancel:
+      return cancel(arguments);
     case Action::status:
-      return status(arguments);
+      return ptc::farm_status(only_plan(arguments));
     case Action::export_tasks:
       return export_tasks(arguments);
     case Action::route:

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstddef>
 #include <span>
+#include <string>
 #include <system_error>
 
 #include "engine/base/error.h"
@@ -78,7 +79,9 @@ std::vector<InputState> states_of(const std::filesystem::path& input) {
 
 void require_unchanged(const std::vector<InputState>& recorded) {
   for (const InputState& state : recorded) {
-    const std::string what = difference(state, state_of(state.path));
+    const std::string what = std::filesystem::exists(state.path)
+                                 ? difference(state, state_of(state.path))
+                                 : "it is gone";
     if (what.empty()) continue;
     throw DataError(state.path.string() + ": the file changed since it was planned: " + what +
                     ": plan again");

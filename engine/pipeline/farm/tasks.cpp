@@ -410,11 +410,15 @@ void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string&
   file.publish();
 }
 
+void forget_failure(const FarmPlan& plan, const FarmTask& task) {
+  std::filesystem::remove(failed_mark(plan, task));
+}
+
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {
   if (is_done(plan, task)) return false;
   require_forerunners(plan, task);
-  std::filesystem::remove(failed_mark(plan, task));
+  forget_failure(plan, task);
   try {
     perform(plan, task, run, progress);
   } catch (const std::exception& error) {

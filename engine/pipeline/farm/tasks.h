@@ -19,6 +19,8 @@ enum class TaskState { waiting, failed, done };
 [[nodiscard]] std::string failure_of(const FarmPlan& plan, const FarmTask& task);
 /// Notes that a task failed. @param text  what it said
 void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
+/// Forgets that a task failed.
+void forget_failure(const FarmPlan& plan, const FarmTask& task);
 
 /// Checks that each task of a plan can run under a cap, with one thread.
 /// @throws LimitError that names the least cap that works
