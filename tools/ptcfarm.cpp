@@ -1,7 +1,7 @@
 // ptcfarm: builds one scene by many tasks, on one machine or on many.
 //
 //   plan      inputs --> plan.json
-//   route, part, join    one task of a plan
+//   route, part, join, shade, collect    one task of a plan
 //   run       all tasks, on this machine
 //   submit, cancel       all tasks, by Slurm
 //   status    how far they are
@@ -34,7 +34,8 @@ constexpr char kPurpose[] =
     "A plan says what is built, where its points are cut into parts, and by which tasks. Each task "
     "is one command line: route sends the points of an input to the parts that they belong to, "
     "part "
-    "sorts and builds the points of one part, join writes the scene file over all parts. A task "
+    "sorts and builds the points of one part, join writes the scene file over all parts; shade "
+    "computes the light at a range of its points, and collect writes the shaded points. A task "
     "that is done does nothing when it is run again, and what a task writes appears whole or not "
     "at all.\n"
     "\n"
@@ -48,6 +49,8 @@ constexpr char kExamples[] =
     "  # Plan a scene of eight parts, and run the tasks on this machine\n"
     "  ptcfarm plan tiles/*.ptcx --parts 8 -o town.json\n"
     "  ptcfarm run town.json --memory 8G\n"
+    "  # Shade its points by tasks, too\n"
+    "  ptcfarm plan tiles/*.ptcx --parts 8 --shade lit.ply -o town.json\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
     "  # Let a cluster run them\n"
@@ -55,7 +58,19 @@ constexpr char kExamples[] =
     "  # See how far the tasks are, and what failed\n"
     "  ptcfarm status town.json\n";
 
-enum class Action { plan, run, submit, cancel, status, export_tasks, route, part, join };
+enum class Action {
+  plan,
+  run,
+  submit,
+  cancel,
+  status,
+  export_tasks,
+  route,
+  part,
+  join,
+  shade,
+  collect
+};
 
 struct Arguments {
   Action action = Action::plan;
@@ -63,6 +78,7 @@ struct Arguments {
   std::filesystem::path output, scene;
   ptc::BuildRequest request;
   ptc::FarmOptions farm;
+  ptc::FarmShading shading;
   std::size_t number = 0;
   ptc::Scheduler scheduler = ptc::Scheduler::parallel;
   bool slurm = false;
@@ -80,12 +96,14 @@ void declare(ptc::Command& command, Arguments& arguments) {
                            {"export", Action::export_tasks},
                            {"route", Action::route},
                            {"part", Action::part},
-                           {"join", Action::join}},
+                           {"join", Action::join},
+                           {"shade", Action::shade},
+                           {"collect", Action::collect}},
                           "plan, run, submit, cancel, status, export, or the kind of a task\n"
                           "plan measures the inputs and writes a plan. run runs its tasks, those "
                           "that are done left out. submit has a cluster run them, and cancel ends "
                           "its jobs. status says how far they are. export writes them for another "
-                          "scheduler. route, part and join run one task.")
+                          "scheduler. route, part, join, shade and collect run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -142,6 +160,34 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
       ->group(kGroup);
 }
 
+void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
+  CLI::App& app = command.app();
+  CLI::Option* shade =
+      command
+          .add_output("--shade", shading.target, ptc::point_output_endings(),
+                      "Also shade the points of the scene, into this file of points\n"
+                      "It gets what ptcshade writes with the same options. The sky is the one of "
+                      "the scene.")
+          ->required(false)
+          ->group("Shading");
+  ptc::add_integer(app, "--ranges", shading.ranges, 0, 10'000,
+                   "Ranges of points to shade; 0: one for each million")
+      ->group("Shading");
+  ptc::add_count(app, "--count", shading.request.count,
+                 "Shade COUNT points, evenly spread [default: all]")
+      ->group("Shading");
+  ptc::add_colour_from(app, shading.request.colour_from)->group("Shading");
+  ptc::add_integer(app, "--bounces", shading.request.bounces, 0, 1,
+                   "Bounces of light; 0 gives occlusion and sky alone")
+      ->group("Shading");
+  ptc::add_surroundings(app, shading.request.gather.around);
+  ptc::add_gather_options(app, shading.request.gather, shading.request.lift);
+  for (const char* name :
+       {"--ranges", "--count", "--colour-from", "--bounces", "--sphere", "--cone", "--distance",
+        "--solid-angle", "--parallax", "--inflation", "--resolution", "--sides", "--lift"})
+    app.get_option(name)->needs(shade);
+}
+
 void declare_container(CLI::App& app, ptc::BuildRequest& request) {
   ptc::add_profile(app, request.profile)->group("Container");
   ptc::add_page_size(app, request.page_shift)->group("Container");
@@ -185,6 +231,7 @@ ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& pr
   std::filesystem::path scene = arguments.scene;
   if (scene.empty()) scene = std::filesystem::path(arguments.output).replace_extension(".ptcx");
   arguments.farm.command = command_of;
+  if (!arguments.shading.target.empty()) arguments.farm.shading = arguments.shading;
   ptc::FarmPlan plan = ptc::make_plan(request, scene, arguments.output, arguments.farm, progress);
   ptc::write_plan(plan);
   return {facts_of(plan),
@@ -291,9 +338,13 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
     case Action::part:
       return run_one(arguments, ptc::TaskKind::part, command, progress);
     case Action::join:
+      return run_one(arguments, ptc::TaskKind::join, command, progress);
+    case Action::shade:
+      return run_one(arguments, ptc::TaskKind::shade, command, progress);
+    case Action::collect:
       break;
   }
-  return run_one(arguments, ptc::TaskKind::join, command, progress);
+  return run_one(arguments, ptc::TaskKind::collect, command, progress);
 }
 
 }  // namespace
@@ -305,6 +356,7 @@ int main(int argc, char** argv) {
   ptc::add_selection(command.app(), arguments.request.selection);
   declare_tasks(command.app(), arguments);
   declare_container(command.app(), arguments.request);
+  declare_shading(command, arguments.shading);
   return command.run(argc, argv,
                      [&](ptc::Progress& progress) { return act(arguments, command, progress); });
 }

@@ -469,6 +469,7 @@ class Farm(ProgramTest):
         while Path(f"/proc/{task}").exists() and "Z" not in Path(f"/proc/{task}/stat").read_text().split()[2]:
             self.assertLess(time.time(), end, "the task goes on")
             time.sleep(0.01)
+        self.assertFalse((self.here / "farm.parts" / "done" / "route.0").exists(), "the task came to its end")
         self.assertEqual([name for name in os.listdir(self.here / "farm.parts") if ".tmp-" in name], [])
 
     def test_a_cap_that_no_task_can_run_under_is_refused_by_the_plan(self):
@@ -479,6 +480,85 @@ class Farm(ProgramTest):
             least = re.search(r"the least that works is (\d+M)", message)[1]
         self.succeed("ptcfarm", "plan", "--city", "30k", "-o", self.here / "farm.json", "--task-memory", least)
         self.succeed("ptcfarm", "run", self.here / "farm.json", "--memory", least, "--threads", "64")
+
+    COARSE = ["--solid-angle", "0.2", "--resolution", "16", "--parallax", "0.3"]
+
+    def check_shaded(self, plan, shade):
+        """Runs a plan that shades, and compares the points with those of one machine."""
+        lit, one = self.here / "lit.ply", self.here / "one.ply"
+        facts = self.plan(*plan, "--shade", lit, *shade)
+        self.run_plan()
+        self.succeed("ptcshade", self.here / "farm.ptcx", "-o", one, *shade[2:], "--threads", "1")
+        self.assertTrue(lit.read_bytes() == one.read_bytes(), shade)
+        folder = self.here / "farm.parts"
+        self.assertEqual([path.name for path in folder.iterdir() if path.is_file() and ".ptcx" not in path.name], [])
+        self.assertEqual(self.run_plan()["ran"], 0)
+        return facts
+
+    def test_shaded_ranges_are_collected_with_the_bits_of_one_machine(self):
+        for points, shade, ranges in (("140k", ["--ranges", 3, "--bounces", 0, *self.COARSE], 3),
+                                      ("20k", ["--ranges", 5, "--lift", "0.3", "--sides", "front"], 5),  # four without points
+                                      ("90k", ["--ranges", 2, "--count", "70k", "--distance", "3", "--falloff", 2, *self.COARSE], 2)):
+            with self.subTest(shade):
+                plan = self.check_shaded(["--city", points], shade)
+                self.assertEqual([task["name"] for task in plan["tasks"][5:]],
+                                 ["join"] + [f"shade.{i}" for i in range(ranges)] + ["collect"])
+
+    def test_shaded_clouds_keep_their_channels(self):
+        cloud = self.here / "a.ply"
+        write_ply(cloud, [(*point, i % 251) for i, point in enumerate(ball(900))], CHANNELS)
+        self.check_shaded([cloud], ["--ranges", 1, "--colour-from", "occlusion"])
+
+    def test_damaged_or_foreign_results_of_ranges_are_refused(self):
+        lit = self.here / "lit.ply"
+        plan = self.plan("--city", "8k", "--shade", lit, "--ranges", 2, *self.COARSE)
+        *before, collect = plan["tasks"]
+        for task in before:
+            self.succeed(*task["command"])
+        results = self.here / "farm.parts" / "shade.1"
+        whole = results.read_bytes()
+        self.assertEqual(len(whole), 40 + 8 + 40 * json.loads(self.succeed("ptcinfo", self.here / "farm.ptcx", "--json").stdout)["points"])
+
+        def flipped(at):
+            changed = bytearray(whole)
+            changed[at] ^= 1
+            return bytes(changed)
+
+        for changed, said in ((flipped(3), "another run"), (flipped(9), "another run"), (flipped(17), "another run"),
+                              (flipped(25), "another run"), (flipped(33), "another run"), (flipped(41), "damaged"),
+                              (flipped(-1), "damaged"), (whole[:-1], "another length"), (whole + b"x", "another length"),
+                              (whole[:30], "shorter"), ((results.parent / "shade.0").read_bytes(), "another run")):
+            results.write_bytes(changed)
+            message = run(*collect["command"])
+            self.assertEqual(message.returncode, 1, message.stderr)
+            self.assertIn(f"{results}: ", message.stderr)
+            self.assertIn(said, message.stderr)
+            self.assertFalse(lit.exists())
+        results.write_bytes(whole)
+        self.succeed(*collect["command"])
+        self.assertTrue(lit.exists())
+        # Lost points are shaded anew
+        lit.unlink()
+        self.assertEqual(self.run_plan()["ran"], 3)
+
+    def test_what_a_farm_does_not_shade_is_refused(self):
+        plan = ["ptcfarm", "plan", "--city", "8k", "-o", self.here / "farm.json"]
+        self.assertIn("must end in", self.fail_with(2, *plan, "--shade", self.here / "lit.ptcx"))
+        self.assertIn("--bounces", self.fail_with(2, *plan, "--shade", self.here / "lit.ply", "--bounces", 2))
+        self.assertIn("--shade", self.fail_with(2, *plan, "--bounces", 0))
+        self.assertIn("is an input", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "farm.json",
+                                                    "--shade", self.cloud))
+        path = self.here / "farm.json"
+        whole = json.dumps(self.plan("--city", "8k", "--shade", self.here / "lit.ply", "--ranges", 2))
+        for change, said in ((dict(bounces=2), "one bounce at most"), (dict(ranges=0), "ranges to shade is out of range"),
+                             (dict(target="lit.ply"), "no absolute path"), (dict(target="/lit.ptcx"), "file of points"),
+                             (dict(solid_angle=-1), "solid_angle"), (dict(sides=2), "no such sides"), (dict(ranges=3), "those that shade")):
+            changed = json.loads(whole)
+            changed["shading"].update(change)
+            path.write_text(json.dumps(changed))
+            message = self.fail_with(1, "ptcfarm", "run", path)
+            self.assertIn(str(path), message)
+            self.assertIn(said.replace("solid_angle", "solid"), message)
 
     def test_a_cap_below_that_of_a_task_is_refused(self):
         self.plan("--city", "30k")

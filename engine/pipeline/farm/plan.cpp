@@ -18,6 +18,7 @@
 #include "engine/pipeline/farm/plan_json.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/shade_ranges.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
 
@@ -32,6 +33,9 @@ constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
 constexpr std::size_t kMaxParts = 10'000;
+constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;  // of a point, as above
+constexpr std::uint64_t kRangePoints = 1'000'000, kResultBytes = 40;
+constexpr std::size_t kMaxRanges = 10'000;
 constexpr double kMaxSeconds = 1e9;  // of a task
 
 void check_request(const BuildRequest& request) {
@@ -76,6 +80,7 @@ void check_paths(const BuildRequest& request, const FarmPlan& plan) {
   std::vector<std::filesystem::path> named = request.inputs;
   named.push_back(plan.scene);
   named.push_back(plan.file);
+  if (plan.shading) named.push_back(plan.shading->target);
   for (const std::filesystem::path& path : named) {
     if (has_control(path))
       throw RequestError("inputs", path.string() + ": a path has no control characters in a farm");
@@ -90,6 +95,7 @@ void check_paths(const BuildRequest& request, const FarmPlan& plan) {
       };
       if (same_file(file, plan.scene)) refuse(plan.scene);
       if (same_file(file, plan.file)) refuse(plan.file);
+      if (plan.shading && same_file(file, plan.shading->target)) refuse(plan.shading->target);
       if (lies_in(file, plan.folder())) refuse(plan.folder());
     }
   }
@@ -122,6 +128,30 @@ std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
   const std::uint64_t groups = plan.row().group_bytes.size();
   const std::uint64_t bytes = plan.points * (groups + 1) * 2 * sizeof(PointRecord);
   return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
+}
+
+/// Adds the tasks that shade ranges of the scene, and one that collects their results.
+void add_shading(FarmPlan& plan, std::uint64_t memory_bytes) {
+  const std::size_t ranges = plan.shading->ranges;
+  const std::uint64_t points = plan.points / ranges;
+  FarmTask collect{.kind = TaskKind::collect,
+                   .inputs = {plan.scene},
+                   .outputs = {plan.shading->target},
+                   .memory_bytes = memory_bytes,
+                   .disk_bytes = plan.points * 2 * kResultBytes,
+                   .seconds = static_cast<double>(plan.points) * kCollectSeconds};
+  for (std::size_t i = 0; i < ranges; ++i) {
+    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::shade, .number = i});
+    task.after = {"join"};
+    task.inputs = {plan.scene};
+    task.outputs = {plan.output(TaskKind::shade, i)};
+    task.memory_bytes = memory_bytes;
+    task.disk_bytes = points * kResultBytes;
+    task.seconds = static_cast<double>(points) * kShadeSeconds;
+    collect.after.push_back(task.name());
+    collect.inputs.push_back(task.outputs[0]);
+  }
+  plan.tasks.push_back(std::move(collect));
 }
 
 void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
@@ -157,6 +187,7 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
   join.disk_bytes = plan.parts() * 4096;
   join.seconds = 0.01 * static_cast<double>(plan.parts());
   plan.tasks.push_back(std::move(join));
+  if (plan.shading) add_shading(plan, memory_bytes);
 }
 
 void require(const FarmPlan& plan, bool holds, const char* rule) {
@@ -200,15 +231,23 @@ void check_plan(const FarmPlan& plan) {
   require(plan,
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
+  if (!plan.shading) return;
+  require(plan, plan.shading->target.is_absolute() && !has_control(plan.shading->target),
+          "the shaded points are no absolute path without control characters");
+  require(plan, plan.shading->ranges >= 1 && plan.shading->ranges <= kMaxRanges,
+          "the number of ranges to shade is out of range");
+  check_shade_by_ranges(plan.shading->request, plan.shading->target);
 }
 
 /// Replaces the tasks that a file says by those that its plan implies. What a task needs may have
 /// been changed.
 void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
   constexpr char kTasks[] =
-      "the tasks are not a route for each input, a part for each range, and a join";
+      "the tasks are not a route for each input, a part for each range, and a join, nor those that "
+      "shade";
   const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
-  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1, kTasks);
+  const std::size_t shading = plan.shading ? plan.shading->ranges + 1 : 0;
+  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1 + shading, kTasks);
   add_tasks(plan, 0);
   const auto same = [](const FarmTask& a, const FarmTask& b) {
     return a.kind == b.kind && a.number == b.number;
@@ -259,13 +298,18 @@ const char* name_of(TaskKind kind) noexcept {
     case TaskKind::part:
       return "part";
     case TaskKind::join:
+      return "join";
+    case TaskKind::shade:
+      return "shade";
+    case TaskKind::collect:
       break;
   }
-  return "join";
+  return "collect";
 }
 
 std::string FarmTask::name() const {
-  return kind == TaskKind::join ? "join" : fmt::format("{}.{}", name_of(kind), number);
+  const bool one = kind == TaskKind::join || kind == TaskKind::collect;
+  return one ? name_of(kind) : fmt::format("{}.{}", name_of(kind), number);
 }
 
 std::filesystem::path FarmPlan::folder() const {
@@ -278,6 +322,10 @@ std::filesystem::path FarmPlan::output(TaskKind kind, std::size_t number) const 
       return folder() / fmt::format("route.{}", number);
     case TaskKind::part:
       return folder() / fmt::format("{}.ptcx", number);
+    case TaskKind::shade:
+      return folder() / fmt::format("shade.{}", number);
+    case TaskKind::collect:
+      return shading.value().target;
     case TaskKind::join:
       break;
   }
@@ -314,7 +362,12 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   check_request(request);
   FarmPlan plan{.file = std::filesystem::absolute(file),
                 .scene = std::filesystem::absolute(scene),
-                .request = request};
+                .request = request,
+                .shading = options.shading};
+  if (plan.shading) {
+    plan.shading->target = std::filesystem::absolute(plan.shading->target);
+    check_shade_by_ranges(plan.shading->request, plan.shading->target);
+  }
   check_paths(request, plan);
   std::map<std::filesystem::path, std::vector<InputState>> states;
   for (const std::filesystem::path& input : request.inputs) {
@@ -356,6 +409,10 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   const std::vector<MortonKey> keys =
       sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
+  if (plan.shading && plan.shading->ranges == 0) {
+    plan.shading->ranges = static_cast<std::size_t>(
+        std::clamp<std::uint64_t>(plan.points / kRangePoints, 1, kMaxRanges));
+  }
   require_task_memory(plan, options.memory_bytes);
   add_tasks(plan, options.memory_bytes);
   for (const FarmInput& input : plan.inputs) require_unchanged(input.states);

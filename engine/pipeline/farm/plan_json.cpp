@@ -1,5 +1,7 @@
 #include "engine/pipeline/farm/plan_json.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -132,6 +134,52 @@ BuildRequest request_of(const OrderedJson& json) {
   return request;
 }
 
+OrderedJson to_json(const FarmShading& shading) {
+  const ShadeRequest& request = shading.request;
+  const GatherOptions& gather = request.gather;
+  const Surroundings& around = gather.around;
+  OrderedJson json{{"target", shading.target.string()},
+                   {"ranges", shading.ranges},
+                   {"bounces", request.bounces},
+                   {"count", request.count},
+                   {"colour_from", request.colour_from},
+                   {"lift", request.lift},
+                   {"solid_angle", gather.solid_angle},
+                   {"parallax", gather.parallax},
+                   {"inflation", gather.inflation},
+                   {"resolution", gather.resolution},
+                   {"sides", static_cast<unsigned>(gather.sides)},
+                   {"sphere", around.sphere},
+                   {"cone", around.cone},
+                   {"falloff", around.falloff}};
+  if (std::isfinite(around.distance)) json["distance"] = around.distance;
+  return json;
+}
+
+FarmShading shading_of(const OrderedJson& json) {
+  FarmShading shading;
+  shading.target = json.at("target").get<std::string>();
+  shading.ranges = json.at("ranges");
+  ShadeRequest& request = shading.request;
+  request.bounces = json.at("bounces");
+  request.count = json.at("count");
+  request.colour_from = json.at("colour_from");
+  request.lift = json.at("lift");
+  GatherOptions& gather = request.gather;
+  gather.solid_angle = json.at("solid_angle");
+  gather.parallax = json.at("parallax");
+  gather.inflation = json.at("inflation");
+  gather.resolution = json.at("resolution");
+  if (json.at("sides").get<unsigned>() > static_cast<unsigned>(Sides::front))
+    throw DataError("there are no such sides");
+  gather.sides = static_cast<Sides>(json.at("sides").get<unsigned>());
+  gather.around.sphere = json.at("sphere");
+  gather.around.cone = json.at("cone");
+  gather.around.falloff = json.at("falloff");
+  if (json.contains("distance")) gather.around.distance = json.at("distance");
+  return shading;
+}
+
 OrderedJson to_json(const FarmTask& task) {
   return {{"name", task.name()},
           {"kind", name_of(task.kind)},
@@ -149,7 +197,8 @@ OrderedJson to_json(const FarmTask& task) {
 FarmTask task_of(const OrderedJson& json) {
   FarmTask task;
   const auto kind = json.at("kind").get<std::string>();
-  for (const TaskKind known : {TaskKind::route, TaskKind::part, TaskKind::join}) {
+  for (const TaskKind known :
+       {TaskKind::route, TaskKind::part, TaskKind::join, TaskKind::shade, TaskKind::collect}) {
     if (kind == name_of(known)) task.kind = known;
   }
   if (kind != name_of(task.kind)) throw DataError("there are no tasks `" + kind + "`");
@@ -190,6 +239,7 @@ FarmPlan plan_of(const OrderedJson& json) {
   plan.meta = {channels_of(json.at("channels")),
                json.at("texts").get<std::map<std::string, std::string>>()};
   for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
+  if (json.contains("shading")) plan.shading = shading_of(json.at("shading"));
   for (const OrderedJson& task : json.at("tasks")) plan.tasks.push_back(task_of(task));
   return plan;
 }
@@ -209,17 +259,18 @@ std::string plan_to_json(const FarmPlan& plan) {
   }
   for (const MortonKey& cut : plan.cuts) cuts.push_back(to_json(cut));
   for (const FarmTask& task : plan.tasks) tasks.push_back(to_json(task));
-  const OrderedJson json{{"format", kFormat},
-                         {"scene", to_json(plan.scene)},
-                         {"points", plan.points},
-                         {"emits", plan.emits},
-                         {"request", to_json(plan.request)},
-                         {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
-                         {"inputs", inputs},
-                         {"channels", to_json(plan.meta.channels)},
-                         {"texts", plan.meta.text},
-                         {"cuts", cuts},
-                         {"tasks", tasks}};
+  OrderedJson json{{"format", kFormat},
+                   {"scene", to_json(plan.scene)},
+                   {"points", plan.points},
+                   {"emits", plan.emits},
+                   {"request", to_json(plan.request)},
+                   {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
+                   {"inputs", inputs},
+                   {"channels", to_json(plan.meta.channels)},
+                   {"texts", plan.meta.text},
+                   {"cuts", cuts},
+                   {"tasks", tasks}};
+  if (plan.shading) json["shading"] = to_json(*plan.shading);
   return json.dump(1) + "\n";
 }
 

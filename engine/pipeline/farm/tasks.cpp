@@ -25,6 +25,7 @@
 #include "engine/pipeline/build/resume.h"
 #include "engine/pipeline/parts/join_parts.h"
 #include "engine/pipeline/parts/part_edges.h"
+#include "engine/pipeline/shade/shade_ranges.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
@@ -51,10 +52,9 @@ void mark_done(const FarmPlan& plan, const FarmTask& task) {
   write_shared_state(done_mark(plan, task), state.take());
 }
 
-bool parts_are_done(const FarmPlan& plan);
+bool is_spent(const FarmPlan& plan, const FarmTask& task);
 
-/// Says whether a task is done. One whose output is gone is not, but for routes that no part needs
-/// any more.
+/// Says whether a task is done. One whose output is gone is not, unless it is spent.
 bool is_done(const FarmPlan& plan, const FarmTask& task) {
   const std::filesystem::path mark = done_mark(plan, task);
   if (!std::filesystem::exists(mark)) return false;
@@ -62,12 +62,16 @@ bool is_done(const FarmPlan& plan, const FarmTask& task) {
   StateReader state(bytes, mark.string());
   if (state.get<std::uint64_t>() != plan.id) return false;
   if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
-  return task.kind == TaskKind::route && parts_are_done(plan);
+  return is_spent(plan, task);
 }
 
-bool parts_are_done(const FarmPlan& plan) {
-  return std::ranges::all_of(plan.tasks, [&](const FarmTask& task) {
-    return task.kind != TaskKind::part || is_done(plan, task);
+/// Says whether no task needs the output of a task any more: that of a route when the parts are
+/// done, that of a range when the results are collected.
+bool is_spent(const FarmPlan& plan, const FarmTask& task) {
+  if (task.kind != TaskKind::route && task.kind != TaskKind::shade) return false;
+  const TaskKind user = task.kind == TaskKind::route ? TaskKind::part : TaskKind::collect;
+  return std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
+    return other.kind != user || is_done(plan, other);
   });
 }
 
@@ -359,6 +363,23 @@ void join(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
   remove_leftovers(plan);
 }
 
+ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
+  ShadeRequest request = plan.shading.value().request;
+  request.scene = plan.scene;
+  request.run = run;
+  return request;
+}
+
+/// Writes the shaded points, and removes the results of the ranges.
+void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
+  std::vector<std::filesystem::path> results;
+  for (std::size_t i = 0; i < plan.shading->ranges; ++i)
+    results.push_back(plan.output(TaskKind::shade, i));
+  collect_shading(shading_of(plan, run), results, plan.id, plan.shading->target, progress);
+  std::error_code gone;
+  for (const std::filesystem::path& result : results) std::filesystem::remove(result, gone);
+}
+
 void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
              Progress& progress) {
   std::filesystem::create_directories(plan.folder());
@@ -369,6 +390,11 @@ void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
       return Part(plan, task, run, progress).run();
     case TaskKind::join:
       return join(plan, run, progress);
+    case TaskKind::shade:
+      return shade_range(shading_of(plan, run), {task.number, plan.shading->ranges}, plan.id,
+                         task.outputs.at(0), progress);
+    case TaskKind::collect:
+      return collect(plan, run, progress);
   }
 }
 
@@ -428,8 +454,8 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     throw;
   }
   mark_done(plan, task);
-  if (task.kind == TaskKind::route && parts_are_done(plan))
-    std::filesystem::remove(task.outputs.at(0));  // a second process of it was later than the parts
+  if (is_spent(plan, task))  // a second process of it was later than those who need its output
+    std::filesystem::remove(task.outputs.at(0));
   return true;
 }
 
