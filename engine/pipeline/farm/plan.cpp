@@ -15,6 +15,7 @@
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
 #include "engine/pipeline/farm/cuts.h"
+#include "engine/pipeline/farm/plan_checks.h"
 #include "engine/pipeline/farm/plan_json.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "engine/pipeline/scene_record.h"
@@ -37,71 +38,6 @@ constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;  // of a point,
 constexpr std::uint64_t kRangePoints = 1'000'000, kResultBytes = 40;
 constexpr std::size_t kMaxRanges = 10'000;
 constexpr double kMaxSeconds = 1e9;  // of a task
-
-void check_request(const BuildRequest& request) {
-  check_page_shift(request.page_shift);
-  require_request(!request.mesh && !request.backdrop, "inputs",
-                  "a farm builds clouds and containers: build meshes to a container first");
-  require_request(request.append.empty() && !request.resume && !request.moment, "append",
-                  "`append`, `resume` and moving scenes are for one machine");
-  require_request(request.city_points == 0 || (request.inputs.empty() && !request.original_order),
-                  "city_points", "`city_points` excludes files and the order of inputs");
-  require_request(!request.lights, "lights",
-                  "a farm builds points with the light that they have: light them afterwards");
-}
-
-/// Says whether two paths lead to one file, or to one name of a file that does not exist.
-bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code absent;
-  return std::filesystem::equivalent(a, b, absent) || same_name(a, b);
-}
-
-/// Says whether a file lies in a folder or below it. A link counts where it lies and where it
-/// leads.
-bool lies_in(const std::filesystem::path& file, const std::filesystem::path& folder) {
-  const std::filesystem::path top = std::filesystem::weakly_canonical(folder);
-  const auto below = [&](const std::filesystem::path& path) {
-    return std::mismatch(top.begin(), top.end(), path.begin(), path.end()).first == top.end();
-  };
-  return below(std::filesystem::weakly_canonical(file)) ||
-         below(std::filesystem::weakly_canonical(directory_of(file)));
-}
-
-/// Says whether a path has characters that end a line of a script or a table.
-bool has_control(const std::filesystem::path& path) {
-  return std::ranges::any_of(path.string(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte < 0x20 || byte == 0x7f;
-  });
-}
-
-/// Refuses a plan whose tasks would replace an input, or that scripts cannot name.
-void check_paths(const BuildRequest& request, const FarmPlan& plan) {
-  std::vector<std::filesystem::path> named = request.inputs;
-  named.push_back(plan.scene);
-  named.push_back(plan.file);
-  if (plan.shading) named.push_back(plan.shading->target);
-  for (const std::filesystem::path& path : named) {
-    if (has_control(path))
-      throw RequestError("inputs", path.string() + ": a path has no control characters in a farm");
-  }
-  for (const std::filesystem::path& input : request.inputs) {
-    for (const std::filesystem::path& file : files_of(input)) {
-      const std::string what = file == input ? "an input" : "a part of " + input.string();
-      const auto refuse = [&](const std::filesystem::path& target) {
-        throw RequestError("inputs", fmt::format("{} would be written over {}, which is {}: choose "
-                                                 "another name",
-                                                 target.string(), file.string(), what));
-      };
-      if (same_file(file, plan.scene)) refuse(plan.scene);
-      if (same_file(file, plan.file)) refuse(plan.file);
-      if (plan.shading && same_file(file, plan.shading->target)) refuse(plan.shading->target);
-      if (lies_in(file, plan.folder())) refuse(plan.folder());
-    }
-  }
-  if (same_file(plan.scene, plan.file))
-    throw RequestError("inputs", plan.scene.string() + ": the scene and the plan are one file");
-}
 
 void check_inputs(const BuildInputs& inputs) {
   require_request(!inputs.has_meshes(), "inputs",
@@ -206,9 +142,11 @@ void check_channels(const FarmPlan& plan, const FarmInput& input) {
 
 /// Checks what a plan says, but for its tasks.
 void check_plan(const FarmPlan& plan) {
-  require(plan, plan.scene.is_absolute() && plan.scene.has_filename() && !has_control(plan.scene),
-          "the scene is no absolute path without control characters");
-  require(plan, !has_control(plan.file), "a path has no control characters in a farm");
+  require(
+      plan,
+      plan.scene.is_absolute() && plan.scene.has_filename() && !has_control_characters(plan.scene),
+      "the scene is no absolute path without control characters");
+  require(plan, !has_control_characters(plan.file), "a path has no control characters in a farm");
   const BuildRequest& request = plan.request;
   check_page_shift(request.page_shift);
   const BuildOptions& tree = request.tree;
@@ -232,7 +170,7 @@ void check_plan(const FarmPlan& plan) {
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
   if (!plan.shading) return;
-  require(plan, plan.shading->target.is_absolute() && !has_control(plan.shading->target),
+  require(plan, plan.shading->target.is_absolute() && !has_control_characters(plan.shading->target),
           "the shaded points are no absolute path without control characters");
   require(plan, plan.shading->ranges >= 1 && plan.shading->ranges <= kMaxRanges,
           "the number of ranges to shade is out of range");
@@ -359,7 +297,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                    const std::filesystem::path& file, const FarmOptions& options,
                    Progress& progress) {
   // Measure the inputs
-  check_request(request);
+  check_plan_request(request);
   FarmPlan plan{.file = std::filesystem::absolute(file),
                 .scene = std::filesystem::absolute(scene),
                 .request = request,
@@ -368,7 +306,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
     plan.shading->target = std::filesystem::absolute(plan.shading->target);
     check_shade_by_ranges(plan.shading->request, plan.shading->target);
   }
-  check_paths(request, plan);
+  check_plan_paths(request, plan);
   std::map<std::filesystem::path, std::vector<InputState>> states;
   for (const std::filesystem::path& input : request.inputs) {
     const std::filesystem::path path = std::filesystem::absolute(input);

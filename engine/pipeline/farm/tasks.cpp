@@ -3,8 +3,6 @@
 #include "engine/pipeline/farm/tasks.h"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -13,7 +11,6 @@
 #include "engine/base/memory_budget.h"
 #include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
-#include "engine/io/file/state_file.h"
 #include "engine/io/file/temporary_name.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/rounding.h"
@@ -34,46 +31,6 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
-
-std::filesystem::path done_mark(const FarmPlan& plan, const FarmTask& task) {
-  return plan.folder() / "done" / task.name();
-}
-
-std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
-  return plan.folder() / "failed" / task.name();
-}
-
-/// Marks a task as done, and whether it has written its output: a part without points has none.
-void mark_done(const FarmPlan& plan, const FarmTask& task) {
-  std::filesystem::create_directories(done_mark(plan, task).parent_path());
-  StateWriter state;
-  state.put(plan.id);
-  state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
-  write_shared_state(done_mark(plan, task), state.take());
-}
-
-bool is_spent(const FarmPlan& plan, const FarmTask& task);
-
-/// Says whether a task is done. One whose output is gone is not, unless it is spent.
-bool is_done(const FarmPlan& plan, const FarmTask& task) {
-  const std::filesystem::path mark = done_mark(plan, task);
-  if (!std::filesystem::exists(mark)) return false;
-  const std::vector<std::byte> bytes = read_state(mark);
-  StateReader state(bytes, mark.string());
-  if (state.get<std::uint64_t>() != plan.id) return false;
-  if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
-  return is_spent(plan, task);
-}
-
-/// Says whether no task needs the output of a task any more: that of a route when the parts are
-/// done, that of a range when the results are collected.
-bool is_spent(const FarmPlan& plan, const FarmTask& task) {
-  if (task.kind != TaskKind::route && task.kind != TaskKind::shade) return false;
-  const TaskKind user = task.kind == TaskKind::route ? TaskKind::part : TaskKind::collect;
-  return std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
-    return other.kind != user || is_done(plan, other);
-  });
-}
 
 constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
 
@@ -415,29 +372,6 @@ void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
 void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
   static_cast<void>(ranges_bytes(plan, memory_bytes, kCapOfPlan));
   static_cast<void>(sorts_bytes(plan, memory_bytes, 1, kCapOfPlan));
-}
-
-TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
-  if (is_done(plan, task)) return TaskState::done;
-  return std::filesystem::exists(failed_mark(plan, task)) ? TaskState::failed : TaskState::waiting;
-}
-
-std::string failure_of(const FarmPlan& plan, const FarmTask& task) {
-  std::ifstream file(failed_mark(plan, task));
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text) {
-  std::filesystem::create_directories(failed_mark(plan, task).parent_path());
-  OutputFile file(failed_mark(plan, task));
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
-}
-
-void forget_failure(const FarmPlan& plan, const FarmTask& task) {
-  std::filesystem::remove(failed_mark(plan, task));
 }
 
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,

@@ -1,26 +1,14 @@
 // The tasks of a plan.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "engine/base/progress.h"
 #include "engine/pipeline/farm/plan.h"
+#include "engine/pipeline/farm/task_marks.h"
 #include "engine/pipeline/run.h"
 
 namespace ptc {
-
-/// How far a task is.
-enum class TaskState { waiting, failed, done };
-
-/// Returns how far a task is, by the marks in the folder of the plan.
-[[nodiscard]] TaskState state_of(const FarmPlan& plan, const FarmTask& task);
-/// Returns what a failed task said last; empty when it is not failed.
-[[nodiscard]] std::string failure_of(const FarmPlan& plan, const FarmTask& task);
-/// Notes that a task failed. @param text  what it said
-void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
-/// Forgets that a task failed.
-void forget_failure(const FarmPlan& plan, const FarmTask& task);
 
 /// Checks that each task of a plan can run under a cap, with one thread.
 /// @throws LimitError that names the least cap that works
