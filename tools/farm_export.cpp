@@ -2,58 +2,22 @@
 // between them say what the plan says.
 #include "tools/farm_export.h"
 
-#include <algorithm>
-#include <cmath>
-#include <span>
 #include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "tools/slurm_arrays.h"
+
 namespace ptc {
 namespace {
-
-constexpr std::size_t kMaxArray = 1000;  // tasks of an array: the limit of Slurm as it comes
-
-/// Returns the tasks of a kind.
-std::vector<const FarmTask*> tasks_of(const FarmPlan& plan, TaskKind kind) {
-  std::vector<const FarmTask*> tasks;
-  for (const FarmTask& task : plan.tasks) {
-    if (task.kind == kind) tasks.push_back(&task);
-  }
-  return tasks;
-}
-
-constexpr TaskKind kKinds[] = {TaskKind::route, TaskKind::part, TaskKind::join};
-
-/// Returns a word as a shell takes it.
-std::string quoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
-
-/// Returns the command line of a task, with another word in place of its number.
-std::string line_of(const FarmTask& task, const std::string& number = {}) {
-  std::string line;
-  for (std::size_t i = 0; i < task.command.size(); ++i) {
-    const bool is_number = i > 0 && task.command[i - 1] == "--number" && !number.empty();
-    line += (line.empty() ? "" : " ") + (is_number ? number : quoted(task.command[i]));
-  }
-  return line;
-}
-
-/// Returns MiB that a task is given: its cap, and what a program takes besides.
-std::uint64_t mebibytes(const FarmTask& task) {
-  return ((task.memory_bytes + task.memory_bytes / 10) >> 20) + 64;
-}
 
 std::string for_parallel(const FarmPlan& plan) {
   std::string text = fmt::format(
       "#!/bin/sh\n# Builds {} by GNU parallel. Its options can follow: --jobs 8, --sshlogin a,b\n"
       "set -e\n",
       plan.scene.string());
-  for (const TaskKind kind : kKinds) {
+  for (const TaskKind kind : kinds_of(plan)) {
     const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
     text += "parallel --halt soon,fail=1 \"$@\" <<'TASKS'\n";
     for (const FarmTask* task : tasks)
@@ -63,38 +27,14 @@ std::string for_parallel(const FarmPlan& plan) {
   return text;
 }
 
-/// Returns a path as Slurm takes it in a pattern of names.
-std::string without_pattern(const std::filesystem::path& path) {
-  std::string text;
-  for (const char c : path.string()) text += c == '%' ? std::string("%%") : std::string(1, c);
-  return text;
-}
-
-/// Returns the lines that submit some tasks of a kind as one array.
+/// Returns the lines that submit an array.
 /// @param after  the variables of the jobs that must be done before, as Slurm takes them
-std::string array_of(const FarmPlan& plan, std::span<const FarmTask* const> tasks,
-                     const std::string& name, const std::string& after) {
-  const FarmTask& first = *tasks.front();
-  const double seconds = (*std::ranges::max_element(tasks, {}, &FarmTask::seconds))->seconds;
-  const std::string number = fmt::format("\"$((SLURM_ARRAY_TASK_ID + {}))\"", first.number);
-  const std::string log = without_pattern(plan.folder() / "log" / name) + ".%a";
-  return fmt::format(
-      "{0}=$(sbatch --parsable --requeue --kill-on-invalid-dep=yes --job-name={1} \\\n"
-      "  --array=0-{2} --mem={3}M --time={4} \\\n"
-      "  --output={5}{6} <<'TASK'\n"
-      "#!/bin/sh\n"
-      "{7} --threads \"${{SLURM_CPUS_PER_TASK:-1}}\" && exit 0\n"
-      "code=$?\n"
-      "# What the machine refused may work on another one\n"
-      "if [ $code -ge 3 ] && [ $code -ne 5 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 2 ]; then\n"
-      "  scontrol requeue \"$SLURM_JOB_ID\" && sleep 60\n"
-      "fi\n"
-      "exit $code\n"
-      "TASK\n"
-      ")\n",
-      name, quoted(plan.scene.stem().string() + "." + name), tasks.size() - 1, mebibytes(first),
-      static_cast<int>(std::ceil(seconds / 6)) + 5, quoted(log),
-      after.empty() ? "" : " --dependency=afterok" + after, line_of(first, number));
+std::string lines_of(const FarmPlan& plan, const SlurmArray& array, const std::string& after) {
+  std::string options;
+  for (const std::string& option : slurm_options(plan, array)) options += " " + option;
+  return fmt::format("{}=$(sbatch --parsable{}{} <<'TASK'\n#!/bin/sh\n{}TASK\n)\n", array.name,
+                     options, after.empty() ? "" : " --dependency=afterok" + after,
+                     slurm_script(array));
 }
 
 std::string for_slurm(const FarmPlan& plan) {
@@ -103,15 +43,12 @@ std::string for_slurm(const FarmPlan& plan) {
       "set -e\nmkdir -p {}\n",
       plan.scene.string(), quoted((plan.folder() / "log").string()));
   std::string after, all;
-  for (const TaskKind kind : kKinds) {
-    const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
+  for (const TaskKind kind : kinds_of(plan)) {
     std::string jobs;
-    for (std::size_t at = 0; at < tasks.size(); at += kMaxArray) {
-      const auto some = std::span(tasks).subspan(at, std::min(kMaxArray, tasks.size() - at));
-      const std::string name = fmt::format("{}_{}", name_of(kind), at / kMaxArray);
-      text += array_of(plan, some, name, after);
-      jobs += ":$" + name;
-      all += " $" + name;
+    for (const SlurmArray& array : slurm_arrays(plan, kind)) {
+      text += lines_of(plan, array, after);
+      jobs += ":$" + array.name;
+      all += " $" + array.name;
     }
     after = jobs;
   }
@@ -122,7 +59,7 @@ std::string for_openjd(const FarmPlan& plan) {
   using Json = nlohmann::ordered_json;
   Json steps = Json::array();
   std::string before;
-  for (const TaskKind kind : kKinds) {
+  for (const TaskKind kind : kinds_of(plan)) {
     const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
     const FarmTask& first = *tasks.front();
     Json arguments = Json::array();

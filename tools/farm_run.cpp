@@ -1,11 +1,13 @@
 #include "tools/farm_run.h"
 
 #include <fcntl.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <fstream>
 #include <map>
 #include <set>
@@ -14,17 +16,28 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <spawn.h>
 
 #include "engine/base/error.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "tools/common.h"
-
-extern char**
-    environ;  // NOLINT(readability-redundant-declaration): not every C library declares it
+#include "tools/farm_retry.h"
+#include "tools/farm_status.h"
 
 namespace ptc {
 namespace {
+
+/// Replaces a child process by a task. It ends with its parent, also when that is killed.
+/// @param parent  number of the process that has started this one
+/// Called between fork() and exec(): only what a signal handler may call.
+[[noreturn]] void become(char* const* arguments, const char* log, pid_t parent) noexcept {
+  const int errors = ::open(log, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const bool set = errors >= 0 && nothing >= 0 && ::dup2(nothing, STDIN_FILENO) >= 0 &&
+                   ::dup2(errors, STDOUT_FILENO) >= 0 && ::dup2(errors, STDERR_FILENO) >= 0 &&
+                   ::prctl(PR_SET_PDEATHSIG, SIGTERM) == 0;
+  if (set && ::getppid() == parent) ::execv(arguments[0], arguments);
+  ::_exit(kSystem);
+}
 
 /// The processes of a run.
 class Runner {
@@ -44,6 +57,7 @@ class Runner {
 
   FarmRun run() {
     std::filesystem::create_directories(plan_.folder() / "log");
+    note_begin(plan_);
     progress_.begin("run", plan_.tasks.size(), "tasks");
     for (const FarmTask& task : plan_.tasks) {
       if (state_of(plan_, task) != TaskState::done) {
@@ -113,17 +127,9 @@ class Runner {
 
     // Start it with its messages in a file
     const std::string log = log_of(task).string();
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log.c_str(),
-                                     O_WRONLY | O_CREAT | O_TRUNC, 0666);
-    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-    pid_t child = 0;
-    const int error =
-        posix_spawn(&child, arguments[0], &actions, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
-    if (error != 0) throw std::system_error(error, std::generic_category(), words[0]);
+    const pid_t parent = ::getpid(), child = ::fork();
+    if (child < 0) throw std::system_error(errno, std::generic_category(), "fork");
+    if (child == 0) become(arguments.data(), log.c_str(), parent);
     running_[child] = &task;
     used_bytes_ += task.memory_bytes;
   }
@@ -139,26 +145,34 @@ class Runner {
     const FarmTask& task = *found->second;
     running_.erase(found);
     used_bytes_ -= task.memory_bytes;
+    const int code = WIFSIGNALED(status) ? kSignalCode + WTERMSIG(status) : WEXITSTATUS(status);
+    if (worth_retry(code) && result_.failed.empty() && tries_[&task]++ < kMaxRetries) {
+      ++result_.retried;
+      waiting_.push_back(&task);  // behind the others: what they take may be free then
+      progress_.note(fmt::format("{} failed with code {} and is run again", task.name(), code));
+      return;
+    }
     progress_.advance(1);
-    if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
+    if (code == 0) {
       done_.insert(task.name());
       ++result_.ran;
     } else {
-      fail(task, status);
+      fail(task, code);
     }
   }
 
-  void fail(const FarmTask& task, int status) {
+  /// @param code  as a shell has it
+  void fail(const FarmTask& task, int code) {
     std::ifstream log(log_of(task));
     std::stringstream text;
     text << log.rdbuf();
-    if (WIFSIGNALED(status))
-      text << fmt::format("{}: it was ended by signal {}\n", task.name(), WTERMSIG(status));
+    if (code > kSignalCode)
+      text << fmt::format("{}: it was ended by signal {}\n", task.name(), code - kSignalCode);
     note_failure(plan_, task, text.str());
     result_.failed.push_back(task.name());
     result_.errors += fmt::format("{} failed:\n{}", task.name(), text.str());
     if (result_.exit_code == 0)
-      result_.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : static_cast<int>(kSystem);
+      result_.exit_code = code > kSignalCode ? static_cast<int>(kSystem) : code;
   }
 
   const FarmPlan& plan_;
@@ -168,6 +182,7 @@ class Runner {
   std::vector<const FarmTask*> waiting_;
   std::map<pid_t, const FarmTask*> running_;
   std::set<std::string> done_;
+  std::map<const FarmTask*, unsigned> tries_;  ///< that failed
   std::uint64_t used_bytes_ = 0;
   FarmRun result_;
 };

@@ -68,6 +68,7 @@ constexpr std::array kFields{
     FieldName{"shadows", "--shadow"},
     FieldName{"size", "--size"},
     FieldName{"sky", "--sky"},
+    FieldName{"task_memory", "--task-memory"},
     FieldName{"texture.margin", "--margin"},
     FieldName{"tolerate_damage", "--tolerate-damage"},
     FieldName{"tree.leaf_points", "--leaf"},

@@ -1,14 +1,16 @@
 // ptcfarm: builds one scene by many tasks, on one machine or on many.
 //
 //   plan      inputs --> plan.json
-//   route, part, join    one task of a plan
+//   route, part, join, shade, collect    one task of a plan
 //   run       all tasks, on this machine
+//   submit, cancel       all tasks, by Slurm
 //   status    how far they are
 //   export    the tasks for another scheduler
 #include <algorithm>
 #include <span>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "engine/io/file/file.h"
 #include "engine/pipeline/farm/plan.h"
@@ -18,9 +20,11 @@
 #include "tools/common.h"
 #include "tools/farm_export.h"
 #include "tools/farm_run.h"
+#include "tools/farm_status.h"
 #include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/slurm_jobs.h"
 #include "tools/values.h"
 
 namespace {
@@ -30,7 +34,8 @@ constexpr char kPurpose[] =
     "A plan says what is built, where its points are cut into parts, and by which tasks. Each task "
     "is one command line: route sends the points of an input to the parts that they belong to, "
     "part "
-    "sorts and builds the points of one part, join writes the scene file over all parts. A task "
+    "sorts and builds the points of one part, join writes the scene file over all parts; shade "
+    "computes the light at a range of its points, and collect writes the shaded points. A task "
     "that is done does nothing when it is run again, and what a task writes appears whole or not "
     "at all.\n"
     "\n"
@@ -44,14 +49,28 @@ constexpr char kExamples[] =
     "  # Plan a scene of eight parts, and run the tasks on this machine\n"
     "  ptcfarm plan tiles/*.ptcx --parts 8 -o town.json\n"
     "  ptcfarm run town.json --memory 8G\n"
+    "  # Shade its points by tasks, too\n"
+    "  ptcfarm plan tiles/*.ptcx --parts 8 --shade lit.ply -o town.json\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
-    "  # Submit the tasks to Slurm\n"
-    "  ptcfarm export town.json --for slurm -o town.sh\n"
+    "  # Let a cluster run them\n"
+    "  ptcfarm submit town.json --slurm\n"
     "  # See how far the tasks are, and what failed\n"
     "  ptcfarm status town.json\n";
 
-enum class Action { plan, run, status, export_tasks, route, part, join };
+enum class Action {
+  plan,
+  run,
+  submit,
+  cancel,
+  status,
+  export_tasks,
+  route,
+  part,
+  join,
+  shade,
+  collect
+};
 
 struct Arguments {
   Action action = Action::plan;
@@ -59,8 +78,10 @@ struct Arguments {
   std::filesystem::path output, scene;
   ptc::BuildRequest request;
   ptc::FarmOptions farm;
+  ptc::FarmShading shading;
   std::size_t number = 0;
   ptc::Scheduler scheduler = ptc::Scheduler::parallel;
+  bool slurm = false;
 };
 
 void declare(ptc::Command& command, Arguments& arguments) {
@@ -69,15 +90,20 @@ void declare(ptc::Command& command, Arguments& arguments) {
   ptc::add_choice<Action>(app, "ACTION", arguments.action,
                           {{"plan", Action::plan},
                            {"run", Action::run},
+                           {"submit", Action::submit},
+                           {"cancel", Action::cancel},
                            {"status", Action::status},
                            {"export", Action::export_tasks},
                            {"route", Action::route},
                            {"part", Action::part},
-                           {"join", Action::join}},
-                          "plan, run, status, export, or the kind of a task\n"
+                           {"join", Action::join},
+                           {"shade", Action::shade},
+                           {"collect", Action::collect}},
+                          "plan, run, submit, cancel, status, export, or the kind of a task\n"
                           "plan measures the inputs and writes a plan. run runs its tasks, those "
-                          "that are done left out. status says how far they are. export writes "
-                          "them for another scheduler. route, part and join run one task.")
+                          "that are done left out. submit has a cluster run them, and cancel ends "
+                          "its jobs. status says how far they are. export writes them for another "
+                          "scheduler. route, part, join, shade and collect run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -125,9 +151,41 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                                   "one submits jobs to Slurm. openjd is a job template of Open Job "
                                   "Description, which other farms take.")
       ->group(kGroup);
+  app.add_flag("--slurm", arguments.slurm,
+               "Submit to Slurm: an array of jobs for each kind of task\n"
+               "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
+      ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
                    "Number of the task among those of its kind")
       ->group(kGroup);
+}
+
+void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
+  CLI::App& app = command.app();
+  CLI::Option* shade =
+      command
+          .add_output("--shade", shading.target, ptc::point_output_endings(),
+                      "Also shade the points of the scene, into this file of points\n"
+                      "It gets what ptcshade writes with the same options. The sky is the one of "
+                      "the scene.")
+          ->required(false)
+          ->group("Shading");
+  ptc::add_integer(app, "--ranges", shading.ranges, 0, 10'000,
+                   "Ranges of points to shade; 0: one for each million")
+      ->group("Shading");
+  ptc::add_count(app, "--count", shading.request.count,
+                 "Shade COUNT points, evenly spread [default: all]")
+      ->group("Shading");
+  ptc::add_colour_from(app, shading.request.colour_from)->group("Shading");
+  ptc::add_integer(app, "--bounces", shading.request.bounces, 0, 1,
+                   "Bounces of light; 0 gives occlusion and sky alone")
+      ->group("Shading");
+  ptc::add_surroundings(app, shading.request.gather.around);
+  ptc::add_gather_options(app, shading.request.gather, shading.request.lift);
+  for (const char* name :
+       {"--ranges", "--count", "--colour-from", "--bounces", "--sphere", "--cone", "--distance",
+        "--solid-angle", "--parallax", "--inflation", "--resolution", "--sides", "--lift"})
+    app.get_option(name)->needs(shade);
 }
 
 void declare_container(CLI::App& app, ptc::BuildRequest& request) {
@@ -173,6 +231,7 @@ ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& pr
   std::filesystem::path scene = arguments.scene;
   if (scene.empty()) scene = std::filesystem::path(arguments.output).replace_extension(".ptcx");
   arguments.farm.command = command_of;
+  if (!arguments.shading.target.empty()) arguments.farm.shading = arguments.shading;
   ptc::FarmPlan plan = ptc::make_plan(request, scene, arguments.output, arguments.farm, progress);
   ptc::write_plan(plan);
   return {facts_of(plan),
@@ -193,6 +252,7 @@ ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progres
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["ran"] = done.ran;
   outcome.facts["skipped"] = done.skipped;
+  outcome.facts["retried"] = done.retried;
   outcome.facts["failed"] = done.failed;
   outcome.exit_code = static_cast<ptc::ExitCode>(done.exit_code);
   outcome.summary = done.failed.empty() ? fmt::format("{}: {} tasks ran, {} were done before\n",
@@ -216,55 +276,31 @@ ptc::Outcome run_one(const Arguments& arguments, ptc::TaskKind kind, ptc::Comman
           fmt::format("{}: {}\n", task->name(), ran ? "done" : "was done before")};
 }
 
-const char* name_of(ptc::TaskState state) {
-  switch (state) {
-    case ptc::TaskState::waiting:
-      return "waiting";
-    case ptc::TaskState::failed:
-      return "failed";
-    case ptc::TaskState::done:
-      break;
-  }
-  return "done";
-}
-
-/// A bar of the share that is done: "[#####.....]".
-std::string bar(double share) {
-  constexpr std::size_t kWidth = 30;
-  const auto full = static_cast<std::size_t>(share * kWidth);
-  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
-}
-
-ptc::Outcome status(const Arguments& arguments) {
+ptc::Outcome submit(const Arguments& arguments) {
+  if (!arguments.slurm) throw CLI::RequiredError("--slurm, the scheduler to submit to,");
   const ptc::FarmPlan plan = only_plan(arguments);
-  std::size_t done = 0, failed = 0;
-  double seconds = 0, left = 0;
-  std::string failures;
-  nlohmann::ordered_json tasks = nlohmann::ordered_json::array();
-  for (const ptc::FarmTask& task : plan.tasks) {
-    const ptc::TaskState state = ptc::state_of(plan, task);
-    const std::string failure =
-        state == ptc::TaskState::failed ? ptc::failure_of(plan, task) : std::string();
-    done += state == ptc::TaskState::done ? 1 : 0;
-    failed += state == ptc::TaskState::failed ? 1 : 0;
-    seconds += task.seconds;
-    left += state == ptc::TaskState::done ? 0 : task.seconds;
-    tasks.push_back({{"name", task.name()}, {"state", name_of(state)}});
-    if (state != ptc::TaskState::failed) continue;
-    tasks.back()["error"] = failure;
-    failures +=
-        fmt::format("{} failed:\n{}{}", task.name(), failure, failure.ends_with('\n') ? "" : "\n");
-  }
+  const std::vector<std::string> jobs = ptc::submit_to_slurm(plan);
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["jobs"] = jobs;
+  outcome.summary = jobs.empty()
+                        ? fmt::format("{}: all tasks are done\n", plan.scene.string())
+                        : fmt::format("{}: jobs {}\n", plan.scene.string(), fmt::join(jobs, ", "));
+  return outcome;
+}
+
+ptc::Outcome cancel(const Arguments& arguments) {
+  const ptc::FarmPlan plan = only_plan(arguments);
+  const std::vector<std::string> jobs = ptc::cancel_in_slurm(plan);
+  const auto done = std::ranges::count_if(plan.tasks, [&](const ptc::FarmTask& task) {
+    return ptc::state_of(plan, task) == ptc::TaskState::done;
+  });
+  const std::size_t left = plan.tasks.size() - static_cast<std::size_t>(done);
+  ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
+  outcome.facts["cancelled"] = jobs;
   outcome.facts["done"] = done;
-  outcome.facts["failed"] = failed;
-  outcome.facts["core_seconds_left"] = left;
-  outcome.facts["states"] = tasks;
-  const double share = seconds > 0 ? (seconds - left) / seconds : 1;
-  outcome.summary = fmt::format(
-      "{} {:.0f} %, {} of {} tasks done, {} failed, about {:.0f} s of "
-      "one core left\n{}",
-      bar(share), 100 * share, done, plan.tasks.size(), failed, left, failures);
+  outcome.facts["left"] = left;
+  outcome.summary = fmt::format("{}: {} jobs cancelled, {} tasks done, {} left\n",
+                                plan.scene.string(), jobs.size(), done, left);
   return outcome;
 }
 
@@ -289,8 +325,12 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
       return plan(arguments, command, progress);
     case Action::run:
       return run(arguments, command, progress);
+    case Action::submit:
+      return submit(arguments);
+    case Action::cancel:
+      return cancel(arguments);
     case Action::status:
-      return status(arguments);
+      return ptc::farm_status(only_plan(arguments));
     case Action::export_tasks:
       return export_tasks(arguments);
     case Action::route:
@@ -298,9 +338,13 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
     case Action::part:
       return run_one(arguments, ptc::TaskKind::part, command, progress);
     case Action::join:
+      return run_one(arguments, ptc::TaskKind::join, command, progress);
+    case Action::shade:
+      return run_one(arguments, ptc::TaskKind::shade, command, progress);
+    case Action::collect:
       break;
   }
-  return run_one(arguments, ptc::TaskKind::join, command, progress);
+  return run_one(arguments, ptc::TaskKind::collect, command, progress);
 }
 
 }  // namespace
@@ -312,6 +356,7 @@ int main(int argc, char** argv) {
   ptc::add_selection(command.app(), arguments.request.selection);
   declare_tasks(command.app(), arguments);
   declare_container(command.app(), arguments.request);
+  declare_shading(command, arguments.shading);
   return command.run(argc, argv,
                      [&](ptc::Progress& progress) { return act(arguments, command, progress); });
 }

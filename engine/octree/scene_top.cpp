@@ -140,6 +140,10 @@ NodeChild SceneTop::build(std::size_t begin, std::size_t end) {
     group.children.push_back(build(first, last));
     first = last;
   }
+  if (group.children.size() > kMaxChildren) {
+    throw DataError(parts_[items_[end - 1].part].name + ": a cell that it shares with " +
+                    parts_[items_[begin].part].name + " has more than 8 children");
+  }
   const NodeSummary node = summarise_children(group.children);
   return {add_group(std::move(group)), node};
 }

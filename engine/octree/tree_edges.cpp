@@ -1,11 +1,16 @@
 #include "engine/octree/tree_edges.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
 #include <tuple>
 #include <utility>
 
 #include "engine/octree/node_state.h"
 #include "engine/octree/page_order.h"
+#include "format/error.h"
+#include "format/morton.h"
 
 namespace ptc {
 namespace {
@@ -47,6 +52,28 @@ void save_way(const std::vector<NodeGroup>& way, StateWriter& state) {
   }
 }
 
+constexpr double kMaxSum = 1e280;  // sums of all parts of a scene stay finite
+
+/// Checks that a child has what a node page can hold.
+void require_storable(StateReader& state, const NodeChild& child) {
+  const NodeSummary& node = child.node;
+  const auto sum = [](double value) { return value >= 0 && value <= kMaxSum; };
+  const auto sums = [&](const std::array<double, 3>& values) {
+    return std::ranges::all_of(values, sum);
+  };
+  constexpr double kEdge = std::uint64_t{1} << kLatticeBits;
+  state.require(
+      child.ref.interior || (child.ref.point_count >= 1 && child.ref.point_count <= kMaxLeafPoints),
+      "a leaf of an edge has no points or more than a leaf may have");
+  state.require(std::ranges::all_of(node.mean, [](double x) { return x >= 0 && x <= kEdge; }),
+                "the mean of a node lies outside of the frame");
+  state.require(sum(node.radius) && sum(node.area) && sum(node.thickness) && sum(node.greatest) &&
+                    std::ranges::all_of(node.facing, sum) && std::ranges::all_of(node.flux, sums) &&
+                    std::ranges::all_of(node.power, sums),
+                "a sum of a node is negative or too large");
+  state.require(std::abs(node.cone_cos) <= 1, "the cone of a node has no angle");
+}
+
 std::vector<NodeGroup> load_way(StateReader& state, const KnowsPage& knows, std::uint64_t points) {
   std::vector<NodeGroup> way(static_cast<std::size_t>(state.get_count(kMaxLevel + 1)));
   state.require(!way.empty(), "an edge of the tree has no root");
@@ -55,14 +82,35 @@ std::vector<NodeGroup> load_way(StateReader& state, const KnowsPage& knows, std:
     group.level = static_cast<int>(state.get_count(kMaxLevel));
     group.children.resize(static_cast<std::size_t>(state.get_count(kMaxChildren)));
     state.require(!group.children.empty(), "a group of an edge has no children");
-    for (NodeChild& child : group.children) child = load_child(state, knows, points);
+    for (NodeChild& child : group.children) {
+      child = load_child(state, knows, points);
+      require_storable(state, child);
+    }
   }
   return way;
 }
 
-/// Checks that a way leads down to its leaf.
+/// Loads the points of a leaf.
+std::vector<PointRecord> load_leaf(StateReader& state) {
+  std::vector<PointRecord> leaf;
+  try {
+    leaf = load_points(state);
+  } catch (const FormatError& error) {
+    state.require(false, std::string("the points of a leaf: ") + error.what());
+  }
+  state.require(!leaf.empty(), "a leaf of an edge has no points");
+  return leaf;
+}
+
+/// Checks that a way leads down to its leaf, which lies in all its cells.
 void require_way(StateReader& state, const std::vector<NodeGroup>& way,
                  std::span<const PointRecord> leaf, Side side) {
+  for (const NodeGroup& group : way) {
+    const bool inside = std::ranges::all_of(leaf, [&](const PointRecord& point) {
+      return cell_of(point.key, group.level) == group.cell;
+    });
+    state.require(inside, "the leaf of an edge lies outside of a cell on the way to it");
+  }
   for (std::size_t i = 0; i < way.size(); ++i) {
     const ChildRef& ref = child_at(way[i].children, side).ref;
     state.require(ref.interior == (i > 0), "an edge of the tree leads to no leaf");
@@ -70,6 +118,34 @@ void require_way(StateReader& state, const std::vector<NodeGroup>& way,
   }
   state.require(child_at(way.front().children, side).ref.point_count == leaf.size(),
                 "a leaf of an edge lacks points");
+}
+
+bool same_group(const NodeGroup& a, const NodeGroup& b) {
+  const auto bytes = [](const NodeGroup& group) {
+    StateWriter state;
+    save_way({group}, state);
+    return state.take();
+  };
+  return bytes(a) == bytes(b);
+}
+
+/// Checks that both ways begin at one root, and part no earlier than below a group with two
+/// children.
+void require_one_tree(StateReader& state, const TreeEdges& edges) {
+  auto a = edges.first.rbegin(), b = edges.last.rbegin();
+  for (bool together = true; together; ++a, ++b) {
+    state.require(a != edges.first.rend() && b != edges.last.rend() && same_group(*a, *b),
+                  a == edges.first.rbegin() ? "the edges have two roots"
+                                            : "the edges part above a single child");
+    together = a->children.size() == 1 && a->children[0].ref.interior;
+  }
+  const ChildRef &first = edges.first.front().children.front().ref,
+                 &last = edges.last.front().children.back().ref;
+  state.require(first.first_point == 0, "the first leaf does not begin with the first point");
+  state.require(last.point_count == edges.points - last.first_point,
+                "the last leaf does not end with the last point");
+  state.require(edges.first_leaf.front().key <= edges.last_leaf.back().key,
+                "the last point lies before the first");
 }
 
 }  // namespace
@@ -96,15 +172,16 @@ void TreeEdges::save(StateWriter& state) const {
 
 void TreeEdges::load(StateReader& state, std::uint32_t node_pages) {
   const auto knows = [&](std::uint32_t page) { return page < node_pages; };
-  points = state.get<std::uint64_t>();
+  points = state.get_count((std::uint64_t{1} << 48) - 1);
   root = {.interior = true, .page = state.get<std::uint32_t>(), .slot = state.get<std::uint16_t>()};
   state.require(knows(root.page), "the root of the edges does not exist");
   first = load_way(state, knows, points);
   last = load_way(state, knows, points);
-  first_leaf = load_points(state);
-  last_leaf = load_points(state);
+  first_leaf = load_leaf(state);
+  last_leaf = load_leaf(state);
   require_way(state, first, first_leaf, Side::first);
   require_way(state, last, last_leaf, Side::last);
+  require_one_tree(state, *this);
   radii.load(state);
 }
 

@@ -38,7 +38,9 @@ struct TreeEdges {
   void save(StateWriter& state) const;
   /// Loads edges that save() saved.
   /// @param node_pages  of the container
-  /// @throws DataError, FormatError when they are no edges of a tree
+  /// @throws DataError when they are no edges of a tree: the top over them may then be wrong, but
+  /// is
+  ///         one that pages can hold
   void load(StateReader& state, std::uint32_t node_pages);
 };
 

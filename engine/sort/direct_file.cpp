@@ -31,10 +31,13 @@ DirectFile::DirectFile(const std::filesystem::path& directory)
 }
 
 DirectFile::DirectFile(const std::filesystem::path& file, Kept how) : name_(file.string()) {
-  const int flags = kFlags | (how == Kept::made ? O_CREAT | O_TRUNC : 0);
+  const int made = how == Kept::made ? O_CREAT | O_TRUNC : O_CREAT | O_EXCL;
+  const int flags = kFlags | (how == Kept::found ? 0 : made);
   fd_ = open_retrying(file, flags, 0600);
-  if (fd_ < 0 && errno == EINVAL)
-    fd_ = open_retrying(file, flags & ~O_DIRECT, 0600);  // the file system has no direct transfers
+  if (fd_ < 0 && errno == EINVAL) {
+    // The file system has no direct transfers, but may have created the file
+    fd_ = open_retrying(file, flags & ~(O_DIRECT | O_EXCL), 0600);
+  }
   if (fd_ < 0) fail("open", name_);
 }
 

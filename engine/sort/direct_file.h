@@ -25,8 +25,9 @@ class DirectFile {
   /// Creates a file without a name in a directory.
   /// @throws std::system_error naming the directory
   explicit DirectFile(const std::filesystem::path& directory);
-  /// Whether a named file is created (an existing one is truncated) or must exist.
-  enum class Kept { made, found };
+  /// Whether a named file is created (an existing one is truncated), created and must not exist, or
+  /// must exist.
+  enum class Kept { made, fresh, found };
   /// Opens a named file, which stays when it is closed.
   /// @throws std::system_error naming the file
   DirectFile(const std::filesystem::path& file, Kept how);

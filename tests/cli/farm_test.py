@@ -28,6 +28,9 @@ wc -l < "$here/sbatch.log"
 """
 CHANNELS = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g", "radiance_b", "red", "green", "blue",
             "intensity"]
+# As a plan has a channel, without components
+CHANNEL = {"name": "a", "type": 1, "components": 0, "group": 2, "role": 0, "colour_space": 0, "unit": "", "scale": 1, "offset": 0,
+           "size": 0}
 
 
 class Farm(ProgramTest):
@@ -122,7 +125,7 @@ class Farm(ProgramTest):
     def test_a_task_waits_for_those_before_it(self):
         self.plan("--city", "30k")
         message = run("ptcfarm", "part", self.here / "farm.json", "--number", "1")
-        self.assertEqual(message.returncode, 1)
+        self.assertEqual(message.returncode, 3)
         self.assertIn("part.1 needs route.0, which is not done", message.stderr)
 
     def test_a_failed_task_is_told_and_run_again(self):
@@ -140,6 +143,7 @@ class Farm(ProgramTest):
         self.assertIn(str(cloud), status["states"][0]["error"])
         self.assertIn(str(cloud), self.succeed("ptcfarm", "status", self.here / "farm.json").stdout)
         cloud.write_bytes(whole)
+        self.plan(cloud)
         self.run_plan()
         status = self.succeed("ptcfarm", "status", self.here / "farm.json").stdout
         self.assertRegex(status, r"^\[#{30}\] 100 %, \d+ of \d+ tasks done, 0 failed")
@@ -159,6 +163,53 @@ class Farm(ProgramTest):
         self.assertGreaterEqual(facts["skipped"], 2)
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
         self.assertEqual([p.name for p in (self.here / "farm.parts").iterdir() if ".tmp-" in p.name], [])
+
+    def start_task(self, task, *before):
+        """Starts a task as a process, which `before` may start in surroundings of its own."""
+        words = [*before, str(BIN / task["command"][0]), *task["command"][1:]]
+        return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+    def end_well(self, *processes):
+        for process in processes:
+            _, errors = process.communicate(timeout=100)
+            self.assertEqual(process.returncode, 0, errors)
+
+    def farm_files(self):
+        """The bytes of the scene and of what lies in its folder, but for marks and logs."""
+        folder = self.here / "farm.parts"
+        return {path.name: path.read_bytes() for path in [self.here / "farm.ptcx", *folder.iterdir()] if path.is_file()}
+
+    def test_two_processes_of_each_task_at_once_end_well_with_the_same_bytes(self):
+        self.plan("--city", "120k", parts=3)
+        self.run_plan()
+        alone = self.farm_files()
+        surroundings = [[]]
+        own_numbers = ["unshare", "--pid", "--fork"]  # each process is number 1, as on two machines
+        if shutil.which("unshare") and subprocess.run([*own_numbers, "true"], capture_output=True).returncode == 0:
+            surroundings.append(own_numbers)
+        for before in surroundings:
+            with self.subTest(before):
+                shutil.rmtree(self.here / "farm.parts")
+                (self.here / "farm.ptcx").unlink()
+                for task in self.plan("--city", "120k", parts=3)["tasks"]:
+                    self.end_well(*(self.start_task(task, *before) for _ in range(3)))
+                self.assertEqual(self.farm_files(), alone)
+
+    def test_join_removes_what_killed_tasks_left_and_nothing_of_a_task_that_runs(self):
+        self.plan("--city", "30k", parts=2)
+        folder = self.here / "farm.parts"
+        folder.mkdir()
+        ended = subprocess.Popen(["true"])
+        ended.wait()
+        host = re.sub("[^0-9a-zA-Z.]", "_", os.uname().nodename[:48])
+        left = [f".0.ptcx.tmp-{host}-{ended.pid}-01234567-0", ".0.ptcx.tmp-elsewhere-7-01234567-1"]
+        kept = [f".0.ptcx.tmp-{host}-{os.getpid()}-01234567-0", ".0.ptcx.tmp-elsewhere-7-01234567-0", ".0.ptcx.tmp-x"]
+        for name in left + kept:
+            (folder / name).write_text("some")
+        old = time.time() - 25 * 3600
+        os.utime(folder / left[1], (old, old))
+        self.run_plan()
+        self.assertEqual(sorted(name for name in os.listdir(folder) if ".tmp-" in name), sorted(kept))
 
     def export(self, scheduler, name):
         self.succeed("ptcfarm", "export", self.here / "farm.json", "--for", scheduler, "-o", self.here / name)
@@ -226,12 +277,16 @@ class Farm(ProgramTest):
         self.plan(self.cloud)
         self.run_plan()
         shutil.copyfile(self.here / "farm.ptcx", copy)
+        shutil.copyfile(self.scene, self.here / "scene.json")
+        (self.here / "farm.parts" / "away.ptcx").symlink_to(self.scene)  # it lies there and leads elsewhere
         before = statue.read_bytes()
         for arguments, names in ((["statue.ptcx", "-o", "statue.json"], ["statue.ptcx", "an input"]),
                                  (["statue.ptcx", "-o", "o.json", "--scene", "statue.ptcx"], ["statue.ptcx", "an input"]),
                                  (["statue.ptcx", "-o", "link.json"], ["link.ptcx", "statue.ptcx"]),
                                  (["link.ptcx", "-o", "statue.json"], ["link.ptcx", "statue.ptcx"]),
                                  (["farm.parts/0.ptcx", "-o", "farm.json"], ["farm.parts", "0.ptcx, which is an input"]),
+                                 (["scene.json", "-o", "scene.json"], ["scene.json", "an input"]),
+                                 (["farm.parts/away.ptcx", "-o", "farm.json"], ["farm.parts", "away.ptcx"]),
                                  (["copy.ptcx", "-o", "farm.json"], ["farm.parts", "a part of copy.ptcx"]),
                                  (["copy.ptcx", "-o", "o.json", "--scene", "farm.parts/1.ptcx"], ["a part of copy.ptcx"])):
             with self.subTest(arguments):
@@ -241,6 +296,9 @@ class Farm(ProgramTest):
         self.assertEqual(statue.read_bytes(), before)
         message = self.fail_with(2, "ptcfarm", "plan", self.scene, "-o", self.here / "a\nb.json")
         self.assertIn("no control characters", message)
+        (self.here / "same.ptcx").symlink_to("same.json")
+        message = self.fail_with(2, "ptcfarm", "plan", self.scene, "-o", "same.json", "--scene", "same.ptcx", cwd=self.here)
+        self.assertIn("the scene and the plan are one file", message)
 
     def test_a_plan_says_neither_other_tasks_nor_what_they_run_and_write(self):
         path, kept = self.here / "farm.json", self.here / "kept"
@@ -260,6 +318,13 @@ class Farm(ProgramTest):
                              (lambda p: p["cuts"].pop(), "and a join"), (lambda p: p["cuts"].reverse(), "do not ascend"),
                              (lambda p: p["inputs"][0].update(taken=[True]), "number of channels"),
                              (lambda p: p["inputs"].clear(), "no inputs"),
+                             (lambda p: p["inputs"][0].update(path="/a.ptcx"), "neither files nor the city"),
+                             (lambda p: p["inputs"][0].update(blocks=[0, 10**9]), "blocks that the city lacks"),
+                             (lambda p: p["inputs"][0].update(channels=[CHANNEL]), "no component of 1, 2, 4 or 8 bytes"),
+                             (lambda p: p["request"].update(leaf_points=0), "points in a leaf"),
+                             (lambda p: p["request"].update(levels_per_stream=99), "levels in a stream"),
+                             (lambda p: p["request"].update(every=0), "every 0 points"),
+                             (lambda p: p["frame"].update(edge=0), "no edge"),
                              (lambda p: p["tasks"][0].update(seconds=-1), "seconds"),
                              (lambda p: p.update(scene="farm.ptcx"), "no absolute path")):
             plan = json.loads(whole)
@@ -276,13 +341,62 @@ class Farm(ProgramTest):
         write_ply(cloud, ball(900))
         message = run("ptcfarm", "route", self.here / "farm.json")
         self.assertEqual(message.returncode, 1)
-        self.assertIn(f"{cloud}: the file changed since it was planned: plan again", message.stderr)
+        self.assertIn(f"{cloud}: the file changed since it was planned: ", message.stderr)
+
+    def test_an_input_that_was_changed_in_place_is_refused(self):
+        """Each change leaves the number of points and their channels as they were."""
+        cloud, scene, parts = self.here / "c.ply", self.here / "s.ptcx", self.here / "p.ptcx"
+        points = ball(3000)
+        write_ply(cloud, points)
+        self.succeed("ptcbuild", cloud, "-o", scene)
+        self.succeed("ptcfarm", "plan", cloud, "--parts", 2, "-o", self.here / "p.json")
+        self.succeed("ptcfarm", "run", self.here / "p.json")
+
+        def relight():
+            lit = self.here / "lit.ptcx"
+            self.succeed("ptcbuild", cloud, "--sun", "0,1,0", "-o", lit)
+            lit.replace(scene)
+
+        def write_later():
+            cloud.write_bytes(cloud.read_bytes())
+
+        def change(offset):
+            whole, times = bytearray(cloud.read_bytes()), cloud.stat()
+            whole[offset] ^= 1
+            cloud.write_bytes(whole)
+            os.utime(cloud, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+        def change_part():
+            self.succeed("ptcbuild", cloud, "--profile", "exact", "-o", self.here / "p.parts" / "0.ptcx")
+
+        for source, named, act, said in ((scene, scene, relight, "its content is another one"),
+                                         (cloud, cloud, lambda: change(2000), "its content is another one"),
+                                         (cloud, cloud, lambda: change(-4), "its content is another one"),
+                                         (cloud, cloud, write_later, "it was written since"),
+                                         (parts, self.here / "p.parts" / "0.ptcx", change_part, "bytes and has")):
+            with self.subTest(source=source, said=said):
+                before = self.plan(source)
+                same = source.read_bytes()
+                if source.suffix == ".ptcx":  # a copy of the same bytes is the same
+                    source.unlink()
+                    source.write_bytes(same)
+                    self.succeed("ptcfarm", "route", self.here / "farm.json")
+                    shutil.rmtree(self.here / "farm.parts")
+                act()
+                message = run("ptcfarm", "route", self.here / "farm.json")
+                self.assertEqual(message.returncode, 1, message.stderr)
+                self.assertIn(f"{named}: the file changed since it was planned: ", message.stderr)
+                self.assertIn(said, message.stderr)
+                self.assertIn("plan again", message.stderr)
+                self.assertFalse((self.here / "farm.parts" / "route.0").exists())
+                if source != parts:  # a plan of the new file is another plan
+                    self.assertNotEqual(self.plan(source)["inputs"], before["inputs"])
 
     def test_other_or_damaged_plans_are_refused(self):
         path = self.here / "farm.json"
         self.plan("--city", "30k")
         text = path.read_text()
-        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 1", "ptcfarm plan 2"),
+        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 2", "ptcfarm plan 1"),
                         text.replace('"kind": "join"', '"kind": "frob"'), text.replace('"points"', '"dots"')):
             path.write_text(changed)
             result = run("ptcfarm", "status", path)
@@ -304,6 +418,147 @@ class Farm(ProgramTest):
         self.assertIn("--output is required", self.fail_with(2, "ptcfarm", "plan", self.scene))
         self.assertIn("takes one plan", self.fail_with(2, "ptcfarm", "run"))
         self.assertIn("needs a value", self.fail_with(2, "ptcfarm", "plan", self.scene, "-o"))
+
+    def children(self, pid):
+        return [int(name) for name in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+    def begin_run(self, *options):
+        """Starts a run and waits until a task of it runs. Returns both."""
+        process = subprocess.Popen([BIN / "ptcfarm", "run", self.here / "farm.json", *options], text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.addCleanup(process.kill)
+        while not (running := self.children(process.pid)):
+            self.assertIsNone(process.poll())
+        return process, running[0]
+
+    def test_a_task_that_a_signal_ends_is_run_again_a_bounded_number_of_times(self):
+        self.plan("--city", "400k", parts=2)
+        process, task = self.begin_run("--json", "--threads", "1")
+        os.kill(task, signal.SIGKILL)
+        output, errors = process.communicate(timeout=100)
+        facts = json.loads(output)
+        self.assertEqual((process.returncode, facts["retried"], facts["failed"]), (0, 1, []), errors)
+        # What the system refuses each time: a folder has the name of a part
+        self.plan("--city", "30k", parts=1)
+        (self.here / "farm.parts" / "0.ptcx").unlink()
+        (self.here / "farm.parts" / "0.ptcx").mkdir()
+        failed = run("ptcfarm", "run", self.here / "farm.json", "--json")
+        self.assertEqual(failed.returncode, 3, failed.stderr)
+        self.assertEqual(json.loads(failed.stdout)["retried"], 2)
+        # Bad input is the same each time
+        self.plan(self.cloud)
+        (self.here / "farm.parts" / "route.0").write_bytes(b"none")
+        (self.here / "farm.parts" / "done" / "route.0").write_bytes(b"none")
+        failed = run("ptcfarm", "run", self.here / "farm.json", "--json")
+        self.assertEqual(failed.returncode, 1, failed.stderr)
+
+    def test_slurm_and_a_run_agree_on_what_is_worth_another_try(self):
+        self.plan("--city", "8k", parts=1)
+        script = self.export("slurm", "farm.sh").read_text()
+        condition, = set(re.findall(r"if \{ (.*); \} && \[ .*RESTART_COUNT:-0\}\" -lt 2 \]", script))
+        loop = f"for code in $(seq 0 255); do if {condition}; then echo $code; fi; done"
+        codes = subprocess.run(["sh", "-c", loop], capture_output=True, text=True).stdout.split()
+        self.assertEqual([int(code) for code in codes], [3, *sorted(set(range(129, 256)) - {129, 130, 131, 143})])
+
+    def test_tasks_end_with_the_run_that_is_killed(self):
+        self.plan("--city", "2M", parts=1)
+        process, task = self.begin_run("--threads", "1")
+        process.kill()
+        process.communicate()
+        end = time.time() + 10
+        while Path(f"/proc/{task}").exists() and "Z" not in Path(f"/proc/{task}/stat").read_text().split()[2]:
+            self.assertLess(time.time(), end, "the task goes on")
+            time.sleep(0.01)
+        self.assertFalse((self.here / "farm.parts" / "done" / "route.0").exists(), "the task came to its end")
+        self.assertEqual([name for name in os.listdir(self.here / "farm.parts") if ".tmp-" in name], [])
+
+    def test_a_cap_that_no_task_can_run_under_is_refused_by_the_plan(self):
+        least = "16M"
+        for kind in ("a route", "a part"):
+            message = self.fail_with(5, "ptcfarm", "plan", "--city", "30k", "-o", self.here / "farm.json", "--task-memory", least)
+            self.assertIn(f"the memory cap is too small for {kind} of this plan", message)
+            least = re.search(r"the least that works is (\d+M)", message)[1]
+        self.succeed("ptcfarm", "plan", "--city", "30k", "-o", self.here / "farm.json", "--task-memory", least)
+        self.succeed("ptcfarm", "run", self.here / "farm.json", "--memory", least, "--threads", "64")
+
+    COARSE = ["--solid-angle", "0.2", "--resolution", "16", "--parallax", "0.3"]
+
+    def check_shaded(self, plan, shade):
+        """Runs a plan that shades, and compares the points with those of one machine."""
+        lit, one = self.here / "lit.ply", self.here / "one.ply"
+        facts = self.plan(*plan, "--shade", lit, *shade)
+        self.run_plan()
+        self.succeed("ptcshade", self.here / "farm.ptcx", "-o", one, *shade[2:], "--threads", "1")
+        self.assertTrue(lit.read_bytes() == one.read_bytes(), shade)
+        folder = self.here / "farm.parts"
+        self.assertEqual([path.name for path in folder.iterdir() if path.is_file() and ".ptcx" not in path.name], [])
+        self.assertEqual(self.run_plan()["ran"], 0)
+        return facts
+
+    def test_shaded_ranges_are_collected_with_the_bits_of_one_machine(self):
+        for points, shade, ranges in (("140k", ["--ranges", 3, "--bounces", 0, *self.COARSE], 3),
+                                      ("20k", ["--ranges", 5, "--lift", "0.3", "--sides", "front"], 5),  # four without points
+                                      ("90k", ["--ranges", 2, "--count", "70k", "--distance", "3", "--falloff", 2, *self.COARSE], 2)):
+            with self.subTest(shade):
+                plan = self.check_shaded(["--city", points], shade)
+                self.assertEqual([task["name"] for task in plan["tasks"][5:]],
+                                 ["join"] + [f"shade.{i}" for i in range(ranges)] + ["collect"])
+
+    def test_shaded_clouds_keep_their_channels(self):
+        cloud = self.here / "a.ply"
+        write_ply(cloud, [(*point, i % 251) for i, point in enumerate(ball(900))], CHANNELS)
+        self.check_shaded([cloud], ["--ranges", 1, "--colour-from", "occlusion"])
+
+    def test_damaged_or_foreign_results_of_ranges_are_refused(self):
+        lit = self.here / "lit.ply"
+        plan = self.plan("--city", "8k", "--shade", lit, "--ranges", 2, *self.COARSE)
+        *before, collect = plan["tasks"]
+        for task in before:
+            self.succeed(*task["command"])
+        results = self.here / "farm.parts" / "shade.1"
+        whole = results.read_bytes()
+        self.assertEqual(len(whole), 40 + 8 + 40 * json.loads(self.succeed("ptcinfo", self.here / "farm.ptcx", "--json").stdout)["points"])
+
+        def flipped(at):
+            changed = bytearray(whole)
+            changed[at] ^= 1
+            return bytes(changed)
+
+        for changed, said in ((flipped(3), "another run"), (flipped(9), "another run"), (flipped(17), "another run"),
+                              (flipped(25), "another run"), (flipped(33), "another run"), (flipped(41), "damaged"),
+                              (flipped(-1), "damaged"), (whole[:-1], "another length"), (whole + b"x", "another length"),
+                              (whole[:30], "shorter"), ((results.parent / "shade.0").read_bytes(), "another run")):
+            results.write_bytes(changed)
+            message = run(*collect["command"])
+            self.assertEqual(message.returncode, 1, message.stderr)
+            self.assertIn(f"{results}: ", message.stderr)
+            self.assertIn(said, message.stderr)
+            self.assertFalse(lit.exists())
+        results.write_bytes(whole)
+        self.succeed(*collect["command"])
+        self.assertTrue(lit.exists())
+        # Lost points are shaded anew
+        lit.unlink()
+        self.assertEqual(self.run_plan()["ran"], 3)
+
+    def test_what_a_farm_does_not_shade_is_refused(self):
+        plan = ["ptcfarm", "plan", "--city", "8k", "-o", self.here / "farm.json"]
+        self.assertIn("must end in", self.fail_with(2, *plan, "--shade", self.here / "lit.ptcx"))
+        self.assertIn("--bounces", self.fail_with(2, *plan, "--shade", self.here / "lit.ply", "--bounces", 2))
+        self.assertIn("--shade", self.fail_with(2, *plan, "--bounces", 0))
+        self.assertIn("is an input", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "farm.json",
+                                                    "--shade", self.cloud))
+        path = self.here / "farm.json"
+        whole = json.dumps(self.plan("--city", "8k", "--shade", self.here / "lit.ply", "--ranges", 2))
+        for change, said in ((dict(bounces=2), "one bounce at most"), (dict(ranges=0), "ranges to shade is out of range"),
+                             (dict(target="lit.ply"), "no absolute path"), (dict(target="/lit.ptcx"), "file of points"),
+                             (dict(solid_angle=-1), "solid_angle"), (dict(sides=2), "no such sides"), (dict(ranges=3), "those that shade")):
+            changed = json.loads(whole)
+            changed["shading"].update(change)
+            path.write_text(json.dumps(changed))
+            message = self.fail_with(1, "ptcfarm", "run", path)
+            self.assertIn(str(path), message)
+            self.assertIn(said.replace("solid_angle", "solid"), message)
 
     def test_a_cap_below_that_of_a_task_is_refused(self):
         self.plan("--city", "30k")

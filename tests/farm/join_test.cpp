@@ -1,6 +1,8 @@
 // Parts that are built apart and joined have the tree of one file.
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <functional>
 #include <string>
 
 #include <catch2/catch.hpp>
@@ -266,4 +268,121 @@ TEST_CASE("join: parts in another order, elsewhere or of another frame are refus
   std::filesystem::copy_file(other.whole(), cloud.whole().parent_path() / "other.ptcx");
   CHECK_THAT(refusal({a, cloud.whole().parent_path() / "other.ptcx"}, cloud.joined()),
              Catch::Contains("it has another frame"));
+}
+
+namespace {
+
+/// Changes the edges of a part, and returns why they are refused; empty when they are not.
+std::string refusal_of_edges(const Cloud& cloud, const std::function<void(TreeEdges&)>& change) {
+  const Cuts begins = cloud.leaf_begins();
+  cloud.join({begins[begins.size() / 2]});
+  const ContainerReader part(cloud.part(1));
+  TreeEdges edges = find_edges(part, ThreadPool(1));
+  change(edges);
+  write_edges(cloud.part(1), part.superblock().xxh3, edges);
+  Progress silent;
+  try {
+    static_cast<void>(
+        join_parts(std::vector{cloud.part(0), cloud.part(1)}, cloud.joined(), {}, silent));
+  } catch (const DataError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace
+
+TEST_CASE("join: edges that are none of a tree are refused by file, offset and rule",
+          "[farm][join]") {
+  const Cloud cloud(random_surfels(500, 12), 8);
+  CHECK(refusal_of_edges(cloud, [](TreeEdges&) {}).empty());
+  struct Case {
+    const char* rule;
+    std::function<void(TreeEdges&)> change;
+  };
+  const std::vector<Case> cases{
+      {"a leaf of an edge has no points or more",
+       [](TreeEdges& e) { e.first.front().children.front().ref.point_count = 0; }},
+      {"a leaf of an edge has no points", [](TreeEdges& e) { e.first_leaf.clear(); }},
+      {"precedes the point before it", [](TreeEdges& e) { std::ranges::reverse(e.last_leaf); }},
+      {"two roots", [](TreeEdges& e) { e.last.back().children.pop_back(); }},
+      {"two roots", [](TreeEdges& e) { ++e.first.back().children.back().ref.slot; }},
+      {"two roots", [](TreeEdges& e) { e.last.pop_back(); }},
+      {"leads to no leaf", [](TreeEdges& e) { e.first.erase(e.first.begin()); }},
+      {"levels of an edge do not rise",
+       [](TreeEdges& e) { e.first.insert(e.first.begin() + 1, e.first[1]); }},
+      {"an edge of the tree has no root", [](TreeEdges& e) { e.first.clear(); }},
+      {"a group of an edge has no children", [](TreeEdges& e) { e.first[0].children.clear(); }},
+      {"outside of a cell on the way", [](TreeEdges& e) { e.last[0].cell = e.first[0].cell; }},
+      {"outside of a cell on the way", [](TreeEdges& e) { e.last_leaf = e.first_leaf; }},
+      {"a leaf of an edge lacks points", [](TreeEdges& e) { e.first_leaf.pop_back(); }},
+      {"does not begin with the first point",
+       [](TreeEdges& e) { ++e.first.front().children.front().ref.first_point; }},
+      {"does not end with the last point",
+       [](TreeEdges& e) { --e.last.front().children.back().ref.first_point; }},
+      {"a number of the state is out of range",
+       [](TreeEdges& e) { e.first.front().children.back().ref.first_point = ~std::uint64_t{0}; }},
+      {"points that do not exist",
+       [](TreeEdges& e) { e.last.front().children.back().ref.point_count = 0xffff; }},
+      {"another number of points",
+       [](TreeEdges& e) {
+         ++e.points;
+         ++e.last.front().children.back().ref.first_point;
+       }},
+      {"a number of the state is out of range", [](TreeEdges& e) { e.points = ~std::uint64_t{0}; }},
+      {"refers to a group or to points",
+       [](TreeEdges& e) {
+         e.first.back().children.front().ref.page = e.last.back().children.front().ref.page = 99;
+       }},
+      {"a group that the part does not have", [](TreeEdges& e) { e.root.slot = 0xffff; }},
+      {"the root of the edges does not exist", [](TreeEdges& e) { e.root.page = 99; }},
+      {"not finite", [](TreeEdges& e) { e.first[0].children[0].node.area = NAN; }},
+      {"negative or too large", [](TreeEdges& e) { e.first[0].children[0].node.area = 1e300; }},
+      {"negative or too large", [](TreeEdges& e) { e.last[0].children[0].node.flux[2][1] = -1; }},
+      {"outside of the frame", [](TreeEdges& e) { e.last[0].children[0].node.mean[1] = -3; }},
+      {"has no angle", [](TreeEdges& e) { e.last[0].children[0].node.cone_cos = 2; }},
+  };
+  for (const auto& [rule, change] : cases) {
+    CAPTURE(rule);
+    const std::string refusal = refusal_of_edges(cloud, change);
+    CHECK_THAT(refusal, Catch::StartsWith(edges_path(cloud.part(1)).string() + ": offset ") &&
+                            Catch::Contains(rule));
+  }
+}
+
+TEST_CASE("join: a cell that two parts share has at most 8 children", "[farm][join]") {
+  const Cloud cloud(random_surfels(500, 12), 8);
+  const std::string refusal = refusal_of_edges(cloud, [](TreeEdges& e) {
+    for (NodeGroup* root : {&e.first.back(), &e.last.back()}) {
+      const NodeChild copy = root->children[0];
+      while (root->children.size() < 8) root->children.insert(root->children.begin() + 1, copy);
+    }
+  });
+  CHECK_THAT(refusal, Catch::StartsWith(cloud.part(1).string()) &&
+                          Catch::Contains("has more than 8 children"));
+}
+
+TEST_CASE("join: edges of any bytes are refused, or give a scene that can be read",
+          "[farm][join]") {
+  const Cloud cloud(random_surfels(60, 12), 8);
+  cloud.join({cloud.leaf_begins()[3]});
+  const std::vector parts{cloud.part(0), cloud.part(1)};
+  const std::vector<std::byte> whole = read_state(edges_path(cloud.part(1)));
+  Progress silent;
+  std::size_t refused = 0, joined = 0;
+  for (std::size_t at = 8; at < whole.size(); at += 29) {
+    std::vector<std::byte> bytes = whole;
+    bytes[at] ^= std::byte{0x81};
+    write_state(edges_path(cloud.part(1)), bytes);
+    CAPTURE(at);
+    try {
+      static_cast<void>(join_parts(parts, cloud.joined(), {}, silent));
+      static_cast<void>(verify_container(cloud.joined(), {.level = VerifyLevel::rebuild}, silent));
+      ++joined;
+    } catch (const DataError& error) {
+      ++refused;
+    }
+  }
+  CHECK(refused > 100);
+  CHECK(joined > 100);  // sums and references of other values
 }

@@ -9,7 +9,10 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/file/file.h"
 #include "engine/sort/record_values.h"
+#include "format/bytes.h"
+#include "format/checksum.h"
 #include "tests/support/scenes.h"
 
 using namespace ptc;
@@ -173,4 +176,29 @@ TEST_CASE("range file: a writer that does not finish leaves nothing", "[farm][ra
     writer.add(points.records, points.values);
   }
   CHECK(std::filesystem::is_empty(dir.path()));
+}
+
+TEST_CASE("range file: blocks behind the end, with checksums that fit, are refused",
+          "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  const auto path = dir / "ranges";
+  const Points points = some_points(300);
+  write(path, points, cuts_of(points, 3));
+  const std::vector<char> whole = bytes_of(path);
+  // The place of the table ends the file; in a row of it, 4 bytes of range come before the offset
+  const auto bytes = std::as_bytes(std::span(whole));
+  const std::byte* const end = bytes.data() + bytes.size() - 24;
+  const auto table = load<std::uint64_t>(end, 0), length = load<std::uint64_t>(end, 8);
+  for (const std::size_t field : {table + 16 + 4, table + 16 + 12}) {  // offset, points
+    for (const std::uint64_t value : {table + 1, table, ~std::uint64_t{0}}) {
+      CAPTURE(field, value);
+      std::vector<std::byte> changed(bytes.begin(), bytes.end());
+      store(changed.data(), field, value);
+      store(changed.data(), changed.size() - 8, xxh3_64(std::span(changed).subspan(table, length)));
+      OutputFile file(path);
+      file.append(changed);
+      file.publish();
+      CHECK_THROWS_WITH(RangeReader(path, kPlan, kRow), Catch::Contains("out of range"));
+    }
+  }
 }

@@ -3,6 +3,7 @@
 
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -15,6 +16,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/file/temporary_name.h"
 #include "tests/io/files.h"
 
 using namespace ptc;
@@ -105,7 +107,8 @@ TEST_CASE("output file: the old file stays until the new one is published", "[io
     OutputFile file(target);
     CHECK(file.temporary().parent_path() == target.parent_path());
     CHECK_THAT(file.temporary().filename().string(),
-               Catch::Matchers::StartsWith(".out.tmp-" + std::to_string(::getpid()) + "-"));
+               Catch::Matchers::StartsWith(".out.tmp-") &&
+                   Catch::Matchers::Contains("-" + std::to_string(::getpid()) + "-"));
     file.append(bytes_of("new text"));
     file.write_at(4, bytes_of("TEXT"));
     file.sync();
@@ -115,6 +118,41 @@ TEST_CASE("output file: the old file stays until the new one is published", "[io
     CHECK(slurp(target) == "new TEXT");
   }
   CHECK(scratch.listing() == "out");
+}
+
+TEST_CASE("temporary name: no two are the same, and what ended processes left is known",
+          "[io][file]") {
+  const test::TemporaryDirectory scratch;
+  const auto target = scratch.path() / "out";
+  CHECK(temporary_name(target) != temporary_name(target));
+  CHECK(temporary_name(scratch.path() / std::string(250, 'x')).filename().string().size() < 256);
+  // Two processes of one number, as in two containers: the counter of each begins anew
+  const auto of_child = [&] {
+    std::array<int, 2> ends{};
+    REQUIRE(::pipe(ends.data()) == 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const std::string name = temporary_name(target).filename().string();
+      static_cast<void>(!::write(ends[1], name.data(), name.size()));
+      ::_exit(0);
+    }
+    ::waitpid(child, nullptr, 0);
+    std::string name(256, '\0');
+    name.resize(static_cast<std::size_t>(::read(ends[0], name.data(), name.size())));
+    for (const int end : ends) ::close(end);
+    return name;
+  };
+  const std::string a = of_child(), b = of_child();
+  const auto random_of = [](const std::string& name) {
+    return name.substr(name.rfind('-') - 8, 8);
+  };
+  CHECK(random_of(a) != random_of(b));
+
+  // That of a child is a leftover, one of this process is none, nor are other files
+  CHECK(is_leftover(scratch.file(a, "left")));
+  CHECK_FALSE(is_leftover(scratch.file(temporary_name(target).filename().string(), "in use")));
+  for (const char* name : {"out", ".out.tmp-", ".out.tmp-host", ".out.tmp-host-x-0-0"})
+    CHECK_FALSE(is_leftover(scratch.file(name, "")));
 }
 
 TEST_CASE("output file: without publish() nothing is left", "[io][file]") {

@@ -33,6 +33,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/file/temporary_name.h"
 
 namespace ptc {
 namespace {
@@ -161,15 +162,6 @@ void unlink_and_reraise(int signal) {
   static_cast<void>(::raise(signal));
 }
 
-// Returns ".NAME.tmp-PID-N" in the directory of the target. A long NAME is cut so that the whole
-// stays below 255 bytes.
-std::filesystem::path temporary_name(const std::filesystem::path& target) {
-  static std::atomic<std::uint64_t> counter = 0;
-  const std::string name = target.filename().string().substr(0, 200);
-  return target.parent_path() / ("." + name + ".tmp-" + std::to_string(::getpid()) + "-" +
-                                 std::to_string(counter.fetch_add(1)));
-}
-
 // Returns the permissions of the file that will be replaced, or nothing when there is none. It
 // throws std::system_error when the target is not a regular file or cannot be one.
 std::optional<mode_t> mode_of(const std::filesystem::path& target) {
@@ -282,7 +274,7 @@ OutputFile::OutputFile(const std::filesystem::path& target) : target_(behind_lin
   do {
     temporary_ = temporary_name(target_);
     fd_ = create_temporary(this, temporary_);
-  } while (fd_ < 0 && errno == EEXIST);  // left by an earlier process of the same number
+  } while (fd_ < 0 && errno == EEXIST);
   if (fd_ < 0) fail(errno, "open", temporary_);
   if (old) static_cast<void>(::fchmod(fd_, *old));
 }

@@ -4,7 +4,7 @@
 //   InputFile       an existing file, read only
 //   OutputFile      a new file that replaces its target whole, or leaves the target as it was:
 //
-//                   .NAME.tmp-PID-N  --write, write, ...-->  --fsync-->  --rename-->  NAME
+//                   .NAME.tmp-HOST-PID-RANDOM-N  --write, ...-->  --fsync-->  --rename-->  NAME
 //                                   an exception or a fatal signal removes the temporary file
 //
 //   TempFile        a file without a name, gone as soon as it is closed
@@ -56,9 +56,8 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// A file that is written under a temporary name (".NAME.tmp-PID-N" in the directory of the target)
-/// and either replaces the target as a whole or is removed. The old file stays until publish() has
-/// succeeded.
+/// A file that is written under a temporary name (temporary_name()) and either replaces the target
+/// as a whole or is removed. The old file stays until publish() has succeeded.
 ///
 /// A target that is a symbolic link stays a link; the file to which it leads is replaced. The new
 /// file gets the permissions of the old one.

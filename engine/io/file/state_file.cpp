@@ -23,9 +23,24 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x4554'4154'5358'5450;  // "PTXSTATE"
 constexpr std::uint64_t kVersion = 7;  // of the file; also the seed of its checksum
-constexpr std::size_t kHeadBytes = 32;
+constexpr std::size_t kHeadBytes = kStateOffset;
 constexpr int kLockTries = 10;
 constexpr std::chrono::milliseconds kLockWait(30);
+
+std::array<std::byte, kHeadBytes> head_of(std::span<const std::byte> state) {
+  std::array<std::byte, kHeadBytes> head{};
+  store(head.data(), 0, kMagic);
+  store(head.data(), 8, kVersion);
+  store(head.data(), 16, std::uint64_t{state.size()});
+  store(head.data(), 24, xxh3_64(state, kVersion));
+  return head;
+}
+
+void write(OutputFile& file, std::span<const std::byte> state) {
+  file.append(head_of(state));
+  file.append(state);
+  file.publish();
+}
 
 }  // namespace
 
@@ -35,10 +50,12 @@ void StateWriter::put_bytes(std::span<const std::byte> bytes) {
 }
 
 void StateReader::fail(const std::string& text) const {
-  throw DataError(name_ + ": " + text);
+  const std::string at = begins_ ? "offset " + std::to_string(*begins_ + last_) + ": " : "";
+  throw DataError(name_ + ": " + at + text);
 }
 
 std::span<const std::byte> StateReader::take(std::uint64_t count) {
+  last_ = all_ - bytes_.size();
   if (count > bytes_.size()) fail("the state ends too early");
   const std::span<const std::byte> taken = bytes_.first(static_cast<std::size_t>(count));
   bytes_ = bytes_.subspan(taken.size());
@@ -69,16 +86,14 @@ std::filesystem::path state_temporary(const std::filesystem::path& path) {
 }
 
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state) {
-  std::array<std::byte, kHeadBytes> head{};
-  store(head.data(), 0, kMagic);
-  store(head.data(), 8, kVersion);
-  store(head.data(), 16, std::uint64_t{state.size()});
-  store(head.data(), 24, xxh3_64(state, kVersion));
   OutputFile file(path, state_temporary(path));
   file.truncate(0);
-  file.append(head);
-  file.append(state);
-  file.publish();
+  write(file, state);
+}
+
+void write_shared_state(const std::filesystem::path& path, std::span<const std::byte> state) {
+  OutputFile file(path);
+  write(file, state);
 }
 
 std::vector<std::byte> read_state(const std::filesystem::path& path) {

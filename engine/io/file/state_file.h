@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,9 @@
 #include "format/bytes.h"
 
 namespace ptc {
+
+/// Bytes of a file of state before the state.
+inline constexpr std::uint64_t kStateOffset = 32;
 
 /// Encodes numbers, bytes and texts one after another. A StateReader reads them in the same order.
 class StateWriter {
@@ -43,8 +47,11 @@ class StateReader {
  public:
   /// @param bytes  the encoded state, which must outlive this reader
   /// @param name   name of the file, for errors
-  StateReader(std::span<const std::byte> bytes, std::string name)
-      : bytes_(bytes), name_(std::move(name)) {}
+  /// @param begins  offset of the state in its file; errors then name the offset of the number that
+  ///                was read last
+  StateReader(std::span<const std::byte> bytes, std::string name,
+              std::optional<std::uint64_t> begins = std::nullopt)
+      : bytes_(bytes), all_(bytes.size()), begins_(begins), name_(std::move(name)) {}
 
   /// Returns the next number or array of three doubles.
   template <class T>
@@ -69,6 +76,8 @@ class StateReader {
   [[nodiscard]] std::span<const std::byte> take(std::uint64_t count);
 
   std::span<const std::byte> bytes_;  ///< not read yet
+  std::size_t all_, last_ = 0;        ///< number of bytes, and the place of the last number
+  std::optional<std::uint64_t> begins_;
   std::string name_;
 };
 
@@ -78,6 +87,9 @@ class StateReader {
 /// Writes a state under a temporary name, flushes it to stable storage and renames it over the old
 /// one. At any moment either the old or the new state exists, complete. @throws std::system_error
 void write_state(const std::filesystem::path& path, std::span<const std::byte> state);
+/// Writes a state as write_state() does, under a temporary name of this process alone: others may
+/// write a state of the same name at the same time, and the last one stays.
+void write_shared_state(const std::filesystem::path& path, std::span<const std::byte> state);
 /// Reads a state and checks it.
 /// @throws DataError that names the file when it is not what write_state() wrote; std::system_error
 [[nodiscard]] std::vector<std::byte> read_state(const std::filesystem::path& path);

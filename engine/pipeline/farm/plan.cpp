@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,11 +14,12 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
-#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/farm/cuts.h"
+#include "engine/pipeline/farm/plan_checks.h"
 #include "engine/pipeline/farm/plan_json.h"
+#include "engine/pipeline/farm/tasks.h"
 #include "engine/pipeline/scene_record.h"
-#include "engine/store/reader.h"
+#include "engine/pipeline/shade/shade_ranges.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
 
@@ -34,81 +34,10 @@ constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
 constexpr std::size_t kMaxParts = 10'000;
+constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;  // of a point, as above
+constexpr std::uint64_t kRangePoints = 1'000'000, kResultBytes = 40;
+constexpr std::size_t kMaxRanges = 10'000;
 constexpr double kMaxSeconds = 1e9;  // of a task
-
-void check_request(const BuildRequest& request) {
-  check_page_shift(request.page_shift);
-  require_request(!request.mesh && !request.backdrop, "inputs",
-                  "a farm builds clouds and containers: build meshes to a container first");
-  require_request(request.append.empty() && !request.resume && !request.moment, "append",
-                  "`append`, `resume` and moving scenes are for one machine");
-  require_request(request.city_points == 0 || (request.inputs.empty() && !request.original_order),
-                  "city_points", "`city_points` excludes files and the order of inputs");
-  require_request(!request.lights, "lights",
-                  "a farm builds points with the light that they have: light them afterwards");
-}
-
-/// Says whether two paths lead to one file, or to one name of a file that does not exist.
-bool same_file(const std::filesystem::path& a, const std::filesystem::path& b) {
-  std::error_code absent;
-  return std::filesystem::equivalent(a, b, absent) || same_name(a, b);
-}
-
-/// Says whether a file lies in a folder or below it. A link counts where it lies and where it
-/// leads.
-bool lies_in(const std::filesystem::path& file, const std::filesystem::path& folder) {
-  const std::filesystem::path top = std::filesystem::weakly_canonical(folder);
-  const auto below = [&](const std::filesystem::path& path) {
-    return std::mismatch(top.begin(), top.end(), path.begin(), path.end()).first == top.end();
-  };
-  return below(std::filesystem::weakly_canonical(file)) ||
-         below(std::filesystem::weakly_canonical(directory_of(file)));
-}
-
-/// Returns an input, and the parts of a scene of parts.
-std::vector<std::filesystem::path> files_of(const std::filesystem::path& input) {
-  std::vector<std::filesystem::path> files{input};
-  if (!std::filesystem::is_regular_file(input) || !is_container(input)) return files;
-  const ContainerReader container(input, ContainerReader::OpenParts::no);
-  if (!container.header().has_parts()) return files;
-  const PartList list = container.read_parts();
-  for (const PartRecord& part : list.parts()) files.push_back(directory_of(input) / part.name);
-  return files;
-}
-
-/// Says whether a path has characters that end a line of a script or a table.
-bool has_control(const std::filesystem::path& path) {
-  return std::ranges::any_of(path.string(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte < 0x20 || byte == 0x7f;
-  });
-}
-
-/// Refuses a plan whose tasks would replace an input, or that scripts cannot name.
-void check_paths(const BuildRequest& request, const FarmPlan& plan) {
-  std::vector<std::filesystem::path> named = request.inputs;
-  named.push_back(plan.scene);
-  named.push_back(plan.file);
-  for (const std::filesystem::path& path : named) {
-    if (has_control(path))
-      throw RequestError("inputs", path.string() + ": a path has no control characters in a farm");
-  }
-  for (const std::filesystem::path& input : request.inputs) {
-    for (const std::filesystem::path& file : files_of(input)) {
-      const std::string what = file == input ? "an input" : "a part of " + input.string();
-      const auto refuse = [&](const std::filesystem::path& target) {
-        throw RequestError("inputs", fmt::format("{} would be written over {}, which is {}: choose "
-                                                 "another name",
-                                                 target.string(), file.string(), what));
-      };
-      if (same_file(file, plan.scene)) refuse(plan.scene);
-      if (same_file(file, plan.file)) refuse(plan.file);
-      if (lies_in(file, plan.folder())) refuse(plan.folder());
-    }
-  }
-  if (same_file(plan.scene, plan.file))
-    throw RequestError("inputs", plan.scene.string() + ": the scene and the plan are one file");
-}
 
 void check_inputs(const BuildInputs& inputs) {
   require_request(!inputs.has_meshes(), "inputs",
@@ -135,6 +64,30 @@ std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
   const std::uint64_t groups = plan.row().group_bytes.size();
   const std::uint64_t bytes = plan.points * (groups + 1) * 2 * sizeof(PointRecord);
   return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
+}
+
+/// Adds the tasks that shade ranges of the scene, and one that collects their results.
+void add_shading(FarmPlan& plan, std::uint64_t memory_bytes) {
+  const std::size_t ranges = plan.shading->ranges;
+  const std::uint64_t points = plan.points / ranges;
+  FarmTask collect{.kind = TaskKind::collect,
+                   .inputs = {plan.scene},
+                   .outputs = {plan.shading->target},
+                   .memory_bytes = memory_bytes,
+                   .disk_bytes = plan.points * 2 * kResultBytes,
+                   .seconds = static_cast<double>(plan.points) * kCollectSeconds};
+  for (std::size_t i = 0; i < ranges; ++i) {
+    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::shade, .number = i});
+    task.after = {"join"};
+    task.inputs = {plan.scene};
+    task.outputs = {plan.output(TaskKind::shade, i)};
+    task.memory_bytes = memory_bytes;
+    task.disk_bytes = points * kResultBytes;
+    task.seconds = static_cast<double>(points) * kShadeSeconds;
+    collect.after.push_back(task.name());
+    collect.inputs.push_back(task.outputs[0]);
+  }
+  plan.tasks.push_back(std::move(collect));
 }
 
 void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
@@ -170,6 +123,7 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
   join.disk_bytes = plan.parts() * 4096;
   join.seconds = 0.01 * static_cast<double>(plan.parts());
   plan.tasks.push_back(std::move(join));
+  if (plan.shading) add_shading(plan, memory_bytes);
 }
 
 void require(const FarmPlan& plan, bool holds, const char* rule) {
@@ -188,9 +142,11 @@ void check_channels(const FarmPlan& plan, const FarmInput& input) {
 
 /// Checks what a plan says, but for its tasks.
 void check_plan(const FarmPlan& plan) {
-  require(plan, plan.scene.is_absolute() && plan.scene.has_filename() && !has_control(plan.scene),
-          "the scene is no absolute path without control characters");
-  require(plan, !has_control(plan.file), "a path has no control characters in a farm");
+  require(
+      plan,
+      plan.scene.is_absolute() && plan.scene.has_filename() && !has_control_characters(plan.scene),
+      "the scene is no absolute path without control characters");
+  require(plan, !has_control_characters(plan.file), "a path has no control characters in a farm");
   const BuildRequest& request = plan.request;
   check_page_shift(request.page_shift);
   const BuildOptions& tree = request.tree;
@@ -213,15 +169,23 @@ void check_plan(const FarmPlan& plan) {
   require(plan,
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
+  if (!plan.shading) return;
+  require(plan, plan.shading->target.is_absolute() && !has_control_characters(plan.shading->target),
+          "the shaded points are no absolute path without control characters");
+  require(plan, plan.shading->ranges >= 1 && plan.shading->ranges <= kMaxRanges,
+          "the number of ranges to shade is out of range");
+  check_shade_by_ranges(plan.shading->request, plan.shading->target);
 }
 
 /// Replaces the tasks that a file says by those that its plan implies. What a task needs may have
 /// been changed.
 void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
   constexpr char kTasks[] =
-      "the tasks are not a route for each input, a part for each range, and a join";
+      "the tasks are not a route for each input, a part for each range, and a join, nor those that "
+      "shade";
   const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
-  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1, kTasks);
+  const std::size_t shading = plan.shading ? plan.shading->ranges + 1 : 0;
+  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1 + shading, kTasks);
   add_tasks(plan, 0);
   const auto same = [](const FarmTask& a, const FarmTask& b) {
     return a.kind == b.kind && a.number == b.number;
@@ -272,13 +236,18 @@ const char* name_of(TaskKind kind) noexcept {
     case TaskKind::part:
       return "part";
     case TaskKind::join:
+      return "join";
+    case TaskKind::shade:
+      return "shade";
+    case TaskKind::collect:
       break;
   }
-  return "join";
+  return "collect";
 }
 
 std::string FarmTask::name() const {
-  return kind == TaskKind::join ? "join" : fmt::format("{}.{}", name_of(kind), number);
+  const bool one = kind == TaskKind::join || kind == TaskKind::collect;
+  return one ? name_of(kind) : fmt::format("{}.{}", name_of(kind), number);
 }
 
 std::filesystem::path FarmPlan::folder() const {
@@ -291,6 +260,10 @@ std::filesystem::path FarmPlan::output(TaskKind kind, std::size_t number) const 
       return folder() / fmt::format("route.{}", number);
     case TaskKind::part:
       return folder() / fmt::format("{}.ptcx", number);
+    case TaskKind::shade:
+      return folder() / fmt::format("shade.{}", number);
+    case TaskKind::collect:
+      return shading.value().target;
     case TaskKind::join:
       break;
   }
@@ -324,11 +297,21 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                    const std::filesystem::path& file, const FarmOptions& options,
                    Progress& progress) {
   // Measure the inputs
-  check_request(request);
+  check_plan_request(request);
   FarmPlan plan{.file = std::filesystem::absolute(file),
                 .scene = std::filesystem::absolute(scene),
-                .request = request};
-  check_paths(request, plan);
+                .request = request,
+                .shading = options.shading};
+  if (plan.shading) {
+    plan.shading->target = std::filesystem::absolute(plan.shading->target);
+    check_shade_by_ranges(plan.shading->request, plan.shading->target);
+  }
+  check_plan_paths(request, plan);
+  std::map<std::filesystem::path, std::vector<InputState>> states;
+  for (const std::filesystem::path& input : request.inputs) {
+    const std::filesystem::path path = std::filesystem::absolute(input);
+    states[path] = states_of(path);
+  }
   const MeshLimits limits{.reading = request.run.memory_bytes,
                           .kept = request.run.memory_bytes,
                           .traced = request.run.memory_bytes,
@@ -347,6 +330,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                          "a farm builds clouds where they are: build scene files on one "
                          "machine");
     plan.inputs.push_back({.path = std::filesystem::absolute(cloud.path),
+                           .states = states[std::filesystem::absolute(cloud.path)],
                            .points = cloud.points,
                            .channels = cloud.channels,
                            .taken = cloud.taken});
@@ -363,7 +347,13 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   const std::vector<MortonKey> keys =
       sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
+  if (plan.shading && plan.shading->ranges == 0) {
+    plan.shading->ranges = static_cast<std::size_t>(
+        std::clamp<std::uint64_t>(plan.points / kRangePoints, 1, kMaxRanges));
+  }
+  require_task_memory(plan, options.memory_bytes);
   add_tasks(plan, options.memory_bytes);
+  for (const FarmInput& input : plan.inputs) require_unchanged(input.states);
   for (FarmTask& task : plan.tasks) task.command = options.command(plan, task);
   return plan;
 }

@@ -3,7 +3,11 @@
 //   make_plan()      inputs --> bounds, sample --> frame, cuts          plan.json
 //   route.0 ...      an input --> its points by range                   scene.parts/route.0
 //   part.0 ...       a range of all inputs --> sorted, built            scene.parts/0.ptcx, its
-//   edges join             edges of all parts --> the top of the tree         scene.ptcx
+//   join             edges of all parts --> the top of the tree         scene.ptcx
+//   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
+//   collect          points, light of all ranges --> shaded points      shaded.ply
+//   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
+//   collect          the light of all ranges --> shaded points          shaded.ply
 //
 // Every task is one command line. It can be run again at any time, publishes what it makes by
 // rename, and leaves a mark when it is done, by which it does nothing the next time.
@@ -13,13 +17,16 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/base/progress.h"
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/farm/input_state.h"
 #include "engine/pipeline/farm/range_file.h"
+#include "engine/pipeline/shade/shade_container.h"
 #include "engine/scene/procedural/city.h"
 #include "format/morton.h"
 #include "format/schema.h"
@@ -27,7 +34,7 @@
 namespace ptc {
 
 /// The kinds of tasks, in the order in which they run.
-enum class TaskKind { route, part, join };
+enum class TaskKind { route, part, join, shade, collect };
 
 /// Returns the name of a kind, "route".
 [[nodiscard]] const char* name_of(TaskKind kind) noexcept;
@@ -50,11 +57,19 @@ struct FarmTask {
 /// What a task of the kind route takes: a cloud of the plan, as it was measured, or some blocks of
 /// the city.
 struct FarmInput {
-  std::filesystem::path path;     ///< empty: the city
-  CityBlocks blocks;              ///< of the city
-  std::uint64_t points = 0;       ///< of the city, about
-  std::vector<Channel> channels;  ///< in the order of its rows
-  std::vector<bool> taken;        ///< as for AttributePlan::add_input()
+  std::filesystem::path path;      ///< empty: the city
+  std::vector<InputState> states;  ///< of the file and its parts, before it was measured
+  CityBlocks blocks;               ///< of the city
+  std::uint64_t points = 0;        ///< of the city, about
+  std::vector<Channel> channels;   ///< in the order of its rows
+  std::vector<bool> taken;         ///< as for AttributePlan::add_input()
+};
+
+/// How the points of the scene are shaded, when they are.
+struct FarmShading {
+  std::filesystem::path target;  ///< file of points
+  ShadeRequest request;          ///< settings; the scene is that of the plan
+  std::size_t ranges = 0;        ///< 0: one for each million points
 };
 
 struct FarmPlan;
@@ -68,6 +83,7 @@ struct FarmOptions {
   TaskCommand command;
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
+  std::optional<FarmShading> shading;
 };
 
 /// A plan, as its file says it.
@@ -82,6 +98,7 @@ struct FarmPlan {
   std::uint64_t points = 0;  ///< expected
   Meta meta;                 ///< record of each part, complete
   std::vector<MortonKey> cuts;
+  std::optional<FarmShading> shading;  ///< with the number of ranges
   std::vector<FarmTask> tasks;
 
   /// Returns the number of parts.
@@ -103,7 +120,8 @@ struct FarmPlan {
 /// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
 ///         light clouds, and for fields that a farm does not take; when the scene or the plan is an
 ///         input or a part of one, when one lies in the folder of the parts, and for paths with
-///         control characters; as build_container()
+///         control characters; DataError when an input changes meanwhile; LimitError when the cap
+///         of the tasks is too small; as build_container()
 [[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
                                  const std::filesystem::path& file, const FarmOptions& options,
                                  Progress& progress);

@@ -1,5 +1,7 @@
 #include "engine/pipeline/farm/plan_json.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -10,7 +12,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr char kFormat[] = "ptcfarm plan 1";
+constexpr char kFormat[] = "ptcfarm plan 2";
 
 OrderedJson to_json(const std::filesystem::path& path) {
   return path.string();
@@ -65,6 +67,28 @@ std::vector<Channel> channels_of(const OrderedJson& json) {
   return channels;
 }
 
+OrderedJson to_json(const std::vector<InputState>& states) {
+  OrderedJson list = OrderedJson::array();
+  for (const InputState& state : states) {
+    list.push_back({{"path", state.path.string()},
+                    {"bytes", state.bytes},
+                    {"modified_ns", state.modified_ns},
+                    {"xxh3", state.xxh3}});
+  }
+  return list;
+}
+
+std::vector<InputState> states_of(const OrderedJson& json) {
+  std::vector<InputState> states;
+  for (const OrderedJson& state : json) {
+    states.push_back({.path = state.at("path").get<std::string>(),
+                      .bytes = state.at("bytes"),
+                      .modified_ns = state.at("modified_ns"),
+                      .xxh3 = state.at("xxh3")});
+  }
+  return states;
+}
+
 OrderedJson to_json(const BuildRequest& request) {
   const Selection& selection = request.selection;
   OrderedJson json{{"city_points", request.city_points},
@@ -110,6 +134,52 @@ BuildRequest request_of(const OrderedJson& json) {
   return request;
 }
 
+OrderedJson to_json(const FarmShading& shading) {
+  const ShadeRequest& request = shading.request;
+  const GatherOptions& gather = request.gather;
+  const Surroundings& around = gather.around;
+  OrderedJson json{{"target", shading.target.string()},
+                   {"ranges", shading.ranges},
+                   {"bounces", request.bounces},
+                   {"count", request.count},
+                   {"colour_from", request.colour_from},
+                   {"lift", request.lift},
+                   {"solid_angle", gather.solid_angle},
+                   {"parallax", gather.parallax},
+                   {"inflation", gather.inflation},
+                   {"resolution", gather.resolution},
+                   {"sides", static_cast<unsigned>(gather.sides)},
+                   {"sphere", around.sphere},
+                   {"cone", around.cone},
+                   {"falloff", around.falloff}};
+  if (std::isfinite(around.distance)) json["distance"] = around.distance;
+  return json;
+}
+
+FarmShading shading_of(const OrderedJson& json) {
+  FarmShading shading;
+  shading.target = json.at("target").get<std::string>();
+  shading.ranges = json.at("ranges");
+  ShadeRequest& request = shading.request;
+  request.bounces = json.at("bounces");
+  request.count = json.at("count");
+  request.colour_from = json.at("colour_from");
+  request.lift = json.at("lift");
+  GatherOptions& gather = request.gather;
+  gather.solid_angle = json.at("solid_angle");
+  gather.parallax = json.at("parallax");
+  gather.inflation = json.at("inflation");
+  gather.resolution = json.at("resolution");
+  if (json.at("sides").get<unsigned>() > static_cast<unsigned>(Sides::front))
+    throw DataError("there are no such sides");
+  gather.sides = static_cast<Sides>(json.at("sides").get<unsigned>());
+  gather.around.sphere = json.at("sphere");
+  gather.around.cone = json.at("cone");
+  gather.around.falloff = json.at("falloff");
+  if (json.contains("distance")) gather.around.distance = json.at("distance");
+  return shading;
+}
+
 OrderedJson to_json(const FarmTask& task) {
   return {{"name", task.name()},
           {"kind", name_of(task.kind)},
@@ -127,7 +197,8 @@ OrderedJson to_json(const FarmTask& task) {
 FarmTask task_of(const OrderedJson& json) {
   FarmTask task;
   const auto kind = json.at("kind").get<std::string>();
-  for (const TaskKind known : {TaskKind::route, TaskKind::part, TaskKind::join}) {
+  for (const TaskKind known :
+       {TaskKind::route, TaskKind::part, TaskKind::join, TaskKind::shade, TaskKind::collect}) {
     if (kind == name_of(known)) task.kind = known;
   }
   if (kind != name_of(task.kind)) throw DataError("there are no tasks `" + kind + "`");
@@ -159,6 +230,7 @@ FarmPlan plan_of(const OrderedJson& json) {
   for (const OrderedJson& input : json.at("inputs")) {
     plan.inputs.push_back(
         {.path = input.at("path").get<std::string>(),
+         .states = states_of(input.at("files")),
          .blocks = {.first = input.at("blocks").at(0), .end = input.at("blocks").at(1)},
          .points = input.at("points"),
          .channels = channels_of(input.at("channels")),
@@ -167,6 +239,7 @@ FarmPlan plan_of(const OrderedJson& json) {
   plan.meta = {channels_of(json.at("channels")),
                json.at("texts").get<std::map<std::string, std::string>>()};
   for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
+  if (json.contains("shading")) plan.shading = shading_of(json.at("shading"));
   for (const OrderedJson& task : json.at("tasks")) plan.tasks.push_back(task_of(task));
   return plan;
 }
@@ -178,6 +251,7 @@ std::string plan_to_json(const FarmPlan& plan) {
               tasks = OrderedJson::array();
   for (const FarmInput& input : plan.inputs) {
     inputs.push_back({{"path", input.path.string()},
+                      {"files", to_json(input.states)},
                       {"blocks", {input.blocks.first, input.blocks.end}},
                       {"points", input.points},
                       {"channels", to_json(input.channels)},
@@ -185,17 +259,18 @@ std::string plan_to_json(const FarmPlan& plan) {
   }
   for (const MortonKey& cut : plan.cuts) cuts.push_back(to_json(cut));
   for (const FarmTask& task : plan.tasks) tasks.push_back(to_json(task));
-  const OrderedJson json{{"format", kFormat},
-                         {"scene", to_json(plan.scene)},
-                         {"points", plan.points},
-                         {"emits", plan.emits},
-                         {"request", to_json(plan.request)},
-                         {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
-                         {"inputs", inputs},
-                         {"channels", to_json(plan.meta.channels)},
-                         {"texts", plan.meta.text},
-                         {"cuts", cuts},
-                         {"tasks", tasks}};
+  OrderedJson json{{"format", kFormat},
+                   {"scene", to_json(plan.scene)},
+                   {"points", plan.points},
+                   {"emits", plan.emits},
+                   {"request", to_json(plan.request)},
+                   {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
+                   {"inputs", inputs},
+                   {"channels", to_json(plan.meta.channels)},
+                   {"texts", plan.meta.text},
+                   {"cuts", cuts},
+                   {"tasks", tasks}};
+  if (plan.shading) json["shading"] = to_json(*plan.shading);
   return json.dump(1) + "\n";
 }
 

@@ -1,7 +1,5 @@
 #include "engine/pipeline/farm/range_file.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -14,6 +12,7 @@
 #include "engine/base/error.h"
 #include "engine/io/file/direct_range.h"
 #include "engine/io/file/state_file.h"
+#include "engine/io/file/temporary_name.h"
 #include "engine/sort/record_values.h"
 #include "format/checksum.h"
 
@@ -32,13 +31,6 @@ bool storable(const PointRecord& point) noexcept {
          std::ranges::all_of(point.radiance, usual) && std::ranges::all_of(point.emission, usual);
 }
 
-/// Returns a name for a file until it is published.
-std::filesystem::path partial_of(const std::filesystem::path& target) {
-  std::filesystem::path path = target;
-  path += ".tmp-" + std::to_string(::getpid());
-  return path;
-}
-
 }  // namespace
 
 std::size_t RangeRow::bytes() const noexcept {
@@ -52,9 +44,9 @@ std::uint64_t RangeWriter::least_memory(std::size_t ranges, const RangeRow& row)
 RangeWriter::RangeWriter(const std::filesystem::path& target, std::uint64_t plan,
                          std::span<const MortonKey> cuts, RangeRow row, std::uint64_t memory_bytes)
     : target_(target),
-      partial_(partial_of(target)),
+      partial_(temporary_name(target)),
       temporary_(partial_),
-      file_(partial_, DirectFile::Kept::made),
+      file_(partial_, DirectFile::Kept::fresh),
       plan_(plan),
       cuts_(cuts.begin(), cuts.end()),
       row_(std::move(row)),
@@ -160,7 +152,7 @@ RangeReader::RangeReader(const std::filesystem::path& path, std::uint64_t plan, 
   require(file.size() >= kEndBytes, "the file is shorter than it was");
   std::vector<std::byte> end(kEndBytes);
   file.read_at(file.size() - kEndBytes, end);
-  StateReader places(end, name);
+  StateReader places(end, name, file.size() - kEndBytes);
   const auto offset = places.get<std::uint64_t>(), length = places.get<std::uint64_t>(),
              xxh3 = places.get<std::uint64_t>();
   require(offset <= file.size() - kEndBytes && length <= file.size() - kEndBytes - offset,
@@ -170,7 +162,7 @@ RangeReader::RangeReader(const std::filesystem::path& path, std::uint64_t plan, 
   std::vector<std::byte> bytes(static_cast<std::size_t>(length));
   file.read_at(offset, bytes);
   require(xxh3_64(bytes) == xxh3, "the table of the file is damaged");
-  StateReader table(bytes, name);
+  StateReader table(bytes, name, offset);
   require(table.get<std::uint64_t>() == plan, "the file is of another plan");
   for (std::uint64_t left = table.get_count(length); left > 0; --left) {
     RangeBlock& block = blocks_.emplace_back();

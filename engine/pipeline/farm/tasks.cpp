@@ -3,8 +3,6 @@
 #include "engine/pipeline/farm/tasks.h"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -13,7 +11,7 @@
 #include "engine/base/memory_budget.h"
 #include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
-#include "engine/io/file/state_file.h"
+#include "engine/io/file/temporary_name.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/rounding.h"
 #include "engine/parallel/thread_pool.h"
@@ -24,6 +22,7 @@
 #include "engine/pipeline/build/resume.h"
 #include "engine/pipeline/parts/join_parts.h"
 #include "engine/pipeline/parts/part_edges.h"
+#include "engine/pipeline/shade/shade_ranges.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
@@ -33,35 +32,25 @@ namespace {
 
 constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
 
-std::filesystem::path done_mark(const FarmPlan& plan, const FarmTask& task) {
-  return plan.folder() / "done" / task.name();
+constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
+
+/// Returns the bytes that a route has for its ranges.
+/// @param field  as for MemoryBudget
+std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t cap, const char* field) {
+  MemoryBudget budget(cap, "a route of this plan", field);
+  budget.charge("buffers", kBufferBytes);
+  return budget.rest("the ranges", RangeWriter::least_memory(plan.parts(), plan.row()));
 }
 
-std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
-  return plan.folder() / "failed" / task.name();
-}
-
-/// Marks a task as done, and whether it has written its output: a part without points has none.
-void mark_done(const FarmPlan& plan, const FarmTask& task) {
-  std::filesystem::create_directories(done_mark(plan, task).parent_path());
-  StateWriter state;
-  state.put(plan.id);
-  state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
-  write_state(done_mark(plan, task), state.take());
-}
-
-/// Says whether a task is done. One whose output is gone is not, but for routes that no part needs
-/// any more.
-bool is_done(const FarmPlan& plan, const FarmTask& task) {
-  const std::filesystem::path mark = done_mark(plan, task);
-  if (!std::filesystem::exists(mark)) return false;
-  const std::vector<std::byte> bytes = read_state(mark);
-  StateReader state(bytes, mark.string());
-  if (state.get<std::uint64_t>() != plan.id) return false;
-  if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
-  return task.kind == TaskKind::route && std::ranges::all_of(plan.tasks, [&](const auto& other) {
-           return other.kind != TaskKind::part || is_done(plan, other);
-         });
+/// Returns the bytes that a part has for its sorts.
+std::uint64_t sorts_bytes(const FarmPlan& plan, std::uint64_t cap, unsigned threads,
+                          const char* field) {
+  MemoryBudget budget(cap, "a part of this plan", field);
+  budget.charge("buffers", kBufferBytes);
+  budget.charge("pages that are written",
+                ContainerWriter::writing_bytes(plan.request.page_shift, threads));
+  budget.charge("node pages that wait", held_pages_bytes(plan.request.page_shift));
+  return budget.rest("the sort", kMinSortBytes * (plan.row().group_bytes.size() + 1));
 }
 
 /// Sends the points of one input to their ranges.
@@ -75,7 +64,7 @@ class Route {
         attributes_(plan.attributes()),
         values_(attributes_.groups()),
         writer_(plan.output(TaskKind::route, task.number), plan.id, plan.cuts, plan.row(),
-                writer_bytes(run.memory_bytes)) {}
+                ranges_bytes(plan, run.memory_bytes, kCapOfRun)) {}
 
   void run() {
     const FarmInput& input = plan_.inputs[number_];
@@ -83,12 +72,14 @@ class Route {
     if (input.path.empty()) {
       feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput);
     } else {
+      require_unchanged(input.states);
       for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
       const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
       require_planned(file.info.channels == input.channels);
       const std::uint64_t before = points_;
       feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
       require_planned(points_ - before == input.points);
+      require_unchanged(input.states);  // nor while it was read
     }
     writer_.finish();
     progress_.end();
@@ -100,11 +91,6 @@ class Route {
     if (holds) return;
     throw DataError(plan_.inputs[number_].path.string() +
                     ": the file changed since it was planned: plan again");
-  }
-
-  [[nodiscard]] std::uint64_t writer_bytes(std::uint64_t cap) const {
-    MemoryBudget budget = budget_of(cap, "this route");
-    return budget.rest("the ranges", RangeWriter::least_memory(plan_.parts(), plan_.row()));
   }
 
   /// Returns the input's number among those that have channels.
@@ -172,16 +158,20 @@ class Part {
         number_(task.number),
         target_(plan.output(TaskKind::part, task.number)),
         run_(run),
-        executor_(run.threads),
+        fit_(threads_that_fit(run,
+                              [&](unsigned threads) {
+                                return sorts_bytes(plan, run.memory_bytes, threads, kCapOfRun);
+                              })),
+        executor_(fit_.threads),
         progress_(progress),
         attributes_(plan.attributes()) {}
 
   void run() {
     open_routes();
     const std::uint64_t points = count();
-    std::filesystem::remove(edges_path(target_));
     if (points == 0) {  // a scene has no part without points
       std::filesystem::remove(target_);
+      std::filesystem::remove(edges_path(target_));
       return;
     }
     progress_.begin("sort", points, "points");
@@ -211,13 +201,8 @@ class Part {
 
   /// Gives the memory to the sorts: those of values get equal shares.
   void sort(std::uint64_t points) {
-    MemoryBudget budget = budget_of(run_.memory_bytes, "this part");
-    budget.charge("pages that are written",
-                  ContainerWriter::writing_bytes(plan_.request.page_shift, executor_.threads()));
-    budget.charge("node pages that wait", held_pages_bytes(plan_.request.page_shift));
     const std::size_t groups = attributes_.groups();
-    const std::uint64_t memory = budget.rest("the sort", kMinSortBytes * (groups + 1));
-    const SortOptions options{.memory_bytes = memory / (groups + 1),
+    const SortOptions options{.memory_bytes = fit_.bytes / (groups + 1),
                               .temp_dirs = temp_dirs(run_, target_),
                               .expected = points,
                               .emits = plan_.emits};
@@ -303,6 +288,7 @@ class Part {
   std::size_t number_;
   std::filesystem::path target_;
   const RunOptions& run_;
+  ThreadsThatFit fit_;  ///< with the bytes of the sorts
   const ThreadPool executor_;
   Progress& progress_;
   AttributePlan attributes_;
@@ -311,15 +297,15 @@ class Part {
   std::optional<AttributeSorts> sorts_;
 };
 
-/// Removes what the routes wrote, and temporary files that killed tasks have left.
+/// Removes what the routes wrote, and temporary files that killed tasks have left. A second process
+/// of a task that is done may still need them: its task ends well for all that (run_task()).
 void remove_leftovers(const FarmPlan& plan) {
   std::error_code gone;
   for (const FarmTask& task : plan.tasks) {
     if (task.kind == TaskKind::route) std::filesystem::remove(task.outputs.at(0), gone);
   }
   for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
-    if (entry.path().filename().string().find(".tmp-") != std::string::npos)
-      std::filesystem::remove(entry.path(), gone);
+    if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
   }
 }
 
@@ -334,6 +320,23 @@ void join(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
   remove_leftovers(plan);
 }
 
+ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
+  ShadeRequest request = plan.shading.value().request;
+  request.scene = plan.scene;
+  request.run = run;
+  return request;
+}
+
+/// Writes the shaded points, and removes the results of the ranges.
+void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
+  std::vector<std::filesystem::path> results;
+  for (std::size_t i = 0; i < plan.shading->ranges; ++i)
+    results.push_back(plan.output(TaskKind::shade, i));
+  collect_shading(shading_of(plan, run), results, plan.id, plan.shading->target, progress);
+  std::error_code gone;
+  for (const std::filesystem::path& result : results) std::filesystem::remove(result, gone);
+}
+
 void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
              Progress& progress) {
   std::filesystem::create_directories(plan.folder());
@@ -344,47 +347,49 @@ void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
       return Part(plan, task, run, progress).run();
     case TaskKind::join:
       return join(plan, run, progress);
+    case TaskKind::shade:
+      return shade_range(shading_of(plan, run), {task.number, plan.shading->ranges}, plan.id,
+                         task.outputs.at(0), progress);
+    case TaskKind::collect:
+      return collect(plan, run, progress);
+  }
+}
+
+/// Refuses a task before its time. What other machines have written may come into view late, so
+/// this is worth another try.
+void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
+  for (const std::string& name : task.after) {
+    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
+    if (before != plan.tasks.end() && is_done(plan, *before)) continue;
+    throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again),
+                            plan.file.string() + ": " + task.name() + " needs " + name +
+                                ", which is not done, or not seen from this machine yet");
   }
 }
 
 }  // namespace
 
-TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
-  if (is_done(plan, task)) return TaskState::done;
-  return std::filesystem::exists(failed_mark(plan, task)) ? TaskState::failed : TaskState::waiting;
-}
-
-std::string failure_of(const FarmPlan& plan, const FarmTask& task) {
-  std::ifstream file(failed_mark(plan, task));
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text) {
-  std::filesystem::create_directories(failed_mark(plan, task).parent_path());
-  OutputFile file(failed_mark(plan, task));
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
+void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
+  static_cast<void>(ranges_bytes(plan, memory_bytes, kCapOfPlan));
+  static_cast<void>(sorts_bytes(plan, memory_bytes, 1, kCapOfPlan));
 }
 
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {
   if (is_done(plan, task)) return false;
-  for (const std::string& name : task.after) {
-    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
-    if (before == plan.tasks.end() || !is_done(plan, *before))
-      throw DataError(plan.file.string() + ": " + task.name() + " needs " + name +
-                      ", which is not done");
-  }
-  std::filesystem::remove(failed_mark(plan, task));
+  require_forerunners(plan, task);
+  forget_failure(plan, task);
   try {
     perform(plan, task, run, progress);
   } catch (const std::exception& error) {
+    // Another process may have done the task in the meantime, and join removed what this one needed
+    if (is_done(plan, task)) return false;
     note_failure(plan, task, error.what());
     throw;
   }
   mark_done(plan, task);
+  if (is_spent(plan, task))  // a second process of it was later than those who need its output
+    std::filesystem::remove(task.outputs.at(0));
   return true;
 }
 

@@ -1,29 +1,27 @@
 // The tasks of a plan.
 #pragma once
 
-#include <optional>
 #include <string>
 
 #include "engine/base/progress.h"
 #include "engine/pipeline/farm/plan.h"
+#include "engine/pipeline/farm/task_marks.h"
 #include "engine/pipeline/run.h"
 
 namespace ptc {
 
-/// How far a task is.
-enum class TaskState { waiting, failed, done };
-
-/// Returns how far a task is, by the marks in the folder of the plan.
-[[nodiscard]] TaskState state_of(const FarmPlan& plan, const FarmTask& task);
-/// Returns what a failed task said last; empty when it is not failed.
-[[nodiscard]] std::string failure_of(const FarmPlan& plan, const FarmTask& task);
-/// Notes that a task failed. @param text  what it said
-void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
+/// Checks that each task of a plan can run under a cap, with one thread.
+/// @throws LimitError that names the least cap that works
+void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes);
 
 /// Runs a task, unless it is done, and marks it as done or failed.
+///
+/// Processes that run one task at the same time, on one machine or on several, do no harm: each
+/// writes under a name of its own, all publish the same bytes, and one that fails after another has
+/// done the task ends well.
 /// @param run  the resources of the task
-/// @return  false when it was done before
-/// @throws DataError when a task that must be done before is not; as the task
+/// @return  false when it was done before, or by another process
+/// @throws std::system_error (EAGAIN) when a task that must be done before is not; as the task
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress);
 

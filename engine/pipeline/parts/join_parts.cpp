@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -20,6 +21,9 @@
 
 namespace ptc {
 namespace {
+
+constexpr std::uint64_t kMaxPoints = (std::uint64_t{1} << 48) - 1;  // that a leaf can refer to
+constexpr std::uint32_t kMaxPages = std::numeric_limits<std::uint32_t>::max();
 
 /// Returns the name of a part as the scene records it.
 std::string name_of(const std::filesystem::path& part, const std::filesystem::path& folder) {
@@ -94,6 +98,8 @@ class Join {
       scene_.bounds_high[k] = both(scene_.bounds_high[k], s.bounds_high[k], std::ranges::max);
       scene_.flux[k] += s.flux[k];
     }
+    if (s.points > kMaxPoints - scene_.points)
+      throw DataError(path.string() + ": with it, the scene has 2^48 points or more");
     scene_.points += s.points;
     scene_.nodes += s.nodes;
     scene_.node_groups += s.node_groups;
@@ -123,8 +129,11 @@ class Join {
     }
   }
 
+  /// @param node_pages  of the scene's own file
   void number_parts(std::uint32_t node_pages) {
     for (PartRecord& record : records_) {
+      if (record.node_pages > kMaxPages - node_pages)
+        throw DataError(record.name + ": with it, the scene has more pages than a reference names");
       record.first_node_page = node_pages;
       node_pages += record.node_pages;
     }

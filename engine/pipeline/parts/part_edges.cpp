@@ -68,6 +68,21 @@ void take_references(const ContainerReader& part, StoredGroups& stored, bool to_
   }
 }
 
+/// Checks that all groups that edges refer to are in the part.
+void require_slots(const ContainerReader& part, const StateReader& state, const TreeEdges& edges) {
+  const auto exists = [&](const ChildRef& ref) {
+    return !ref.interior || ref.slot < part.entry(part.node_pages()[ref.page]).record_count;
+  };
+  bool all = exists(edges.root);
+  for (const std::vector<NodeGroup>* way : {&edges.first, &edges.last}) {
+    for (const NodeGroup& group : *way) {
+      all = all && std::ranges::all_of(group.children,
+                                       [&](const NodeChild& child) { return exists(child.ref); });
+    }
+  }
+  state.require(all, "an edge refers to a group that the part does not have");
+}
+
 }  // namespace
 
 std::filesystem::path edges_path(const std::filesystem::path& part) {
@@ -81,19 +96,20 @@ void write_edges(const std::filesystem::path& part, std::uint64_t superblock_xxh
   StateWriter state;
   state.put(superblock_xxh3);
   edges.save(state);
-  write_state(edges_path(part), state.take());
+  write_shared_state(edges_path(part), state.take());
 }
 
 TreeEdges edges_of(const ContainerReader& part, const Executor& executor) {
   const std::filesystem::path path = edges_path(part.path());
   if (!std::filesystem::exists(path)) return find_edges(part, executor);
   const std::vector<std::byte> bytes = read_state(path);
-  StateReader state(bytes, path.string());
+  StateReader state(bytes, path.string(), kStateOffset);
   if (state.get<std::uint64_t>() != part.superblock().xxh3) return find_edges(part, executor);
   TreeEdges edges;
   edges.load(state, part.superblock().node_pages);
   state.require(edges.points == part.superblock().points, "the part has another number of points");
   state.end();
+  require_slots(part, state, edges);
   return edges;
 }
 

@@ -33,118 +33,16 @@
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/render/primary.h"
 #include "engine/pipeline/scene_record.h"
+#include "engine/pipeline/shade/receivers.h"
 #include "engine/pipeline/shade/shaded_groups.h"
 #include "engine/pipeline/shade/shaded_sink.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/pipeline/temporary_container.h"
-#include "engine/shade/lift.h"
 #include "engine/store/attribute_rows.h"
 #include "engine/store/point_scan.h"
 
 namespace ptc {
 namespace {
-
-constexpr std::size_t kBatch = 16 * Shader::kBlock;  // receivers in memory at once
-
-/// An even selection of a container's points, in their order and in blocks.
-///
-/// Point i of `all` is selected when a multiple of all / wanted falls on it. share_ counts this in
-/// integers, as Bresenham's algorithm does: it grows by `wanted` for each point, and a point at
-/// which it reaches `all` is selected and takes `all` off.
-class PointCursor {
- public:
-  /// @param groups  of the channels whose values rows have
-  /// @param wanted  number of points to select, at most as many as there are
-  /// @param from    index among the selected points of the first that next() gives, below `wanted`
-  /// @param lost    gets the damaged pages, whose points are skipped; null: damaged pages are
-  ///                errors
-  PointCursor(const ContainerReader& container, std::span<const std::uint8_t> groups,
-              std::uint64_t wanted, std::uint64_t from = 0, LostPages* lost = nullptr)
-      : container_(container),
-        wanted_(wanted),
-        scan_(container, noted_in(lost)),
-        rows_(container, groups) {
-    if (from == 0) return;
-    // The products of two numbers of points take up to 128 bits; share_ is below `wanted`
-    __extension__ typedef unsigned __int128 Wide;
-    const Wide before = Wide{from} * all_points();
-    const auto passed =
-        static_cast<std::uint64_t>((before + wanted - 1) / wanted);  // they hold `from` selected
-    share_ = static_cast<std::uint64_t>(Wide{passed} * wanted - before);
-    std::uint64_t left = passed;
-    for (; left > 0 && left >= scan_.next_count(); scan_.skip(1)) left -= scan_.next_count();
-    if (scan_.next()) at_ = static_cast<std::uint32_t>(left);
-  }
-
-  /// The channels of a row.
-  [[nodiscard]] std::span<const Channel> channels() const noexcept { return rows_.channels(); }
-
-  /// Fills `out` from the front. @return the number of points, 0 at the end
-  /// @param rows  gets the rows of their channels; may be null
-  std::size_t next(std::span<Surfel> out, std::vector<std::byte>* rows = nullptr) {
-    std::size_t filled = 0;
-    if (rows) rows->clear();
-    while (filled < out.size()) {
-      if (at_ == scan_.count()) {
-        pass_unwanted_pages();
-        if (!scan_.next()) break;
-        at_ = 0;
-      }
-      std::span<const std::byte> page_rows;
-      if (rows && scan_.whole()) page_rows = rows_.read(scan_.index(), scan_.count());
-      const PointPage points = scan_.points();
-      for (; at_ < points.size() && filled < out.size(); ++at_) {
-        share_ += wanted_;
-        if (share_ < all_points()) continue;
-        share_ -= all_points();
-        if (!scan_.whole()) continue;
-        out[filled++] = to_surfel(points[at_], container_.header().frame);
-        if (!rows) continue;
-        const auto row = page_rows.subspan(at_ * rows_.row_bytes(), rows_.row_bytes());
-        rows->insert(rows->end(), row.begin(), row.end());
-      }
-    }
-    return filled;
-  }
-
- private:
-  [[nodiscard]] std::uint64_t all_points() const noexcept { return container_.superblock().points; }
-
-  /// Skips the pages before the next one with a selected point, without reading them.
-  void pass_unwanted_pages() {
-    while (const std::uint32_t count = scan_.next_count()) {
-      const std::uint64_t share = share_ + wanted_ * count;
-      if (share >= all_points()) return;
-      share_ = share;
-      scan_.skip(1);
-    }
-  }
-
-  const ContainerReader& container_;
-  std::uint64_t wanted_;
-  std::uint64_t share_ = 0;  // wanted_ for each point passed, less all_points() for each selected
-  PointScan scan_;
-  std::uint32_t at_ = 0;  // next point of the page
-  AttributeRows rows_;
-};
-
-/// Returns the text by which a shaded container records its settings.
-/// @param rays  of a receiver; 0: the gather shaded it
-std::string settings_text(const ShadeRequest& request, const GatherOptions& g, unsigned rays) {
-  std::string text = rays > 0 ? fmt::format("rays {}", rays)
-                              : fmt::format("solid_angle {} parallax {} inflation {} resolution {}",
-                                            g.solid_angle, g.parallax, g.inflation, g.resolution);
-  text += fmt::format(" sides {} lift {}", g.sides == Sides::both ? "both" : "front", request.lift);
-  const Surroundings& around = g.around;
-  if (around.sphere) text += " sphere";
-  if (around.cone < Surroundings{}.cone) text += fmt::format(" cone {}", around.cone);
-  if (around.distance < Surroundings{}.distance)
-    text += fmt::format(" distance {} falloff {}", around.distance, around.falloff);
-  if (request.bounces != 1) text += fmt::format(" bounces {}", request.bounces);
-  if (request.estimate) text += " estimates";
-  if (request.glossy.roughness) text += fmt::format(" glossy {}", *request.glossy.roughness);
-  return text;
-}
 
 ShadedExtras extras_of(const ShadeRequest& request) {
   return {.estimates = request.estimate,
@@ -204,11 +102,8 @@ struct OpenReceivers {
   /// Returns the groups that are needed: for a file of points all but those of an earlier shading;
   /// a container takes pages as they are, so the rises alone.
   [[nodiscard]] std::vector<std::uint8_t> groups_for(const std::filesystem::path& target) const {
-    if (!output_format(target)) return rise_groups(container.meta().channels);
-    std::vector<std::uint8_t> all(container.groups().begin(), container.groups().end());
-    std::erase_if(
-        all, [&](std::uint8_t group) { return holds_shading(container.meta().channels, group); });
-    return all;
+    return output_format(target) ? groups_without_shading(container)
+                                 : rise_groups(container.meta().channels);
   }
 
   [[nodiscard]] std::uint64_t count_whole() const {
@@ -242,29 +137,6 @@ void check_count(const OpenReceivers& receivers, const std::filesystem::path& ta
                      "receivers. Name a .ply, or shade all points");
 }
 
-/// Puts receivers above the points of a cursor: at the lift of the run, and clear of the noise of
-/// scanned surfaces.
-class Lifting {
- public:
-  /// @param channels  of the rows of the points
-  Lifting(const Frame& frame, std::span<const Channel> channels, float lift)
-      : frame_(frame), lift_(lift), row_bytes_(row_bytes(channels)), rise_(channels) {}
-
-  void place(std::span<const Surfel> surfels, std::span<const std::byte> rows,
-             std::span<Receiver> receivers) const {
-    for (std::size_t i = 0; i < surfels.size(); ++i) {
-      const float rise = rise_.radii(rows.data() + i * row_bytes_);
-      receivers[i] = lifted(surfels[i], std::max(lift_, rise), frame_);
-    }
-  }
-
- private:
-  Frame frame_;
-  float lift_;
-  std::size_t row_bytes_;
-  RisePlace rise_;
-};
-
 /// Returns pilots that stand for all receivers: some of the blocks that are shaded. (A batch is put
 /// along the curve of the scene before it is cut, so the receivers of another container may be cut
 /// a little elsewhere.)
@@ -295,8 +167,8 @@ void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, D
                ShadedSink& sink) {
   PointCursor cursor = receivers.cursor();
   const Lifting lifting(receivers.container.header().frame, cursor.channels(), lift);
-  std::vector<Surfel> surfels(kBatch);
-  std::vector<Receiver> batch(kBatch);
+  std::vector<Surfel> surfels(kReceiverBatch);
+  std::vector<Receiver> batch(kReceiverBatch);
   std::vector<std::byte> rows;
   while (const std::size_t count = cursor.next(surfels, &rows)) {
     lifting.place(std::span(surfels).first(count), rows, batch);

@@ -1,0 +1,75 @@
+#include "engine/pipeline/farm/task_marks.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <fstream>
+#include <span>
+#include <sstream>
+#include <vector>
+
+#include "engine/io/file/file.h"
+#include "engine/io/file/state_file.h"
+
+namespace ptc {
+namespace {
+
+std::filesystem::path done_mark(const FarmPlan& plan, const FarmTask& task) {
+  return plan.folder() / "done" / task.name();
+}
+
+std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
+  return plan.folder() / "failed" / task.name();
+}
+
+}  // namespace
+
+void mark_done(const FarmPlan& plan, const FarmTask& task) {
+  std::filesystem::create_directories(done_mark(plan, task).parent_path());
+  StateWriter state;
+  state.put(plan.id);
+  state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
+  write_shared_state(done_mark(plan, task), state.take());
+}
+
+bool is_done(const FarmPlan& plan, const FarmTask& task) {
+  const std::filesystem::path mark = done_mark(plan, task);
+  if (!std::filesystem::exists(mark)) return false;
+  const std::vector<std::byte> bytes = read_state(mark);
+  StateReader state(bytes, mark.string());
+  if (state.get<std::uint64_t>() != plan.id) return false;
+  if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
+  return is_spent(plan, task);
+}
+
+bool is_spent(const FarmPlan& plan, const FarmTask& task) {
+  if (task.kind != TaskKind::route && task.kind != TaskKind::shade) return false;
+  const TaskKind user = task.kind == TaskKind::route ? TaskKind::part : TaskKind::collect;
+  return std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
+    return other.kind != user || is_done(plan, other);
+  });
+}
+
+TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
+  if (is_done(plan, task)) return TaskState::done;
+  return std::filesystem::exists(failed_mark(plan, task)) ? TaskState::failed : TaskState::waiting;
+}
+
+std::string failure_of(const FarmPlan& plan, const FarmTask& task) {
+  std::ifstream file(failed_mark(plan, task));
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text) {
+  std::filesystem::create_directories(failed_mark(plan, task).parent_path());
+  OutputFile file(failed_mark(plan, task));
+  file.append(std::as_bytes(std::span(text)));
+  file.publish();
+}
+
+void forget_failure(const FarmPlan& plan, const FarmTask& task) {
+  std::filesystem::remove(failed_mark(plan, task));
+}
+
+}  // namespace ptc

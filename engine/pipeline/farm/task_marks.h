@@ -1,0 +1,33 @@
+// The marks of the tasks of a plan, by which all machines know what is done.
+//
+//   scene.parts/done/part.3     the plan, and whether the task has written its output
+//   scene.parts/failed/part.3   what it said
+#pragma once
+
+#include <string>
+
+#include "engine/pipeline/farm/plan.h"
+
+namespace ptc {
+
+/// How far a task is.
+enum class TaskState { waiting, failed, done };
+
+/// Returns how far a task is, by the marks in the folder of the plan.
+[[nodiscard]] TaskState state_of(const FarmPlan& plan, const FarmTask& task);
+/// Returns what a failed task said last; empty when it is not failed.
+[[nodiscard]] std::string failure_of(const FarmPlan& plan, const FarmTask& task);
+/// Notes that a task failed. @param text  what it said
+void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text);
+/// Forgets that a task failed.
+void forget_failure(const FarmPlan& plan, const FarmTask& task);
+
+/// Marks a task as done, and whether it has written its output: a part without points has none.
+void mark_done(const FarmPlan& plan, const FarmTask& task);
+/// Says whether a task is done. One whose output is gone is not, unless it is spent.
+[[nodiscard]] bool is_done(const FarmPlan& plan, const FarmTask& task);
+/// Says whether no task needs the output of a task any more: that of a route when the parts are
+/// done, that of a range when the results are collected.
+[[nodiscard]] bool is_spent(const FarmPlan& plan, const FarmTask& task);
+
+}  // namespace ptc

@@ -1,0 +1,49 @@
+// Shades the points of a scene range by range, on many machines, and collects the results.
+//
+//   receivers   |-------- batch --------|-------- batch --------|---- batch ----|
+//   ranges      |             0                                 |       1       |   shade_range()
+//                              \                                    /
+//   points                       file with the bits of one machine collect_shading()
+//
+// The light of a receiver depends on those that are shaded with it, so that ranges end where the
+// batches of a whole run end.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "engine/base/progress.h"
+#include "engine/pipeline/shade/shade_container.h"
+
+namespace ptc {
+
+/// Which of the ranges of a run, all of about equal length.
+struct RangeNumber {
+  std::size_t number = 0, of = 1;
+};
+
+/// Refuses what cannot be shaded range by range: other receivers than the points of one container,
+/// more than one bounce, errors to meet and to estimate, reflections, shadows, groups of lights, a
+/// sky, damage, checks, and the order of the input.
+/// @param target  a file of points
+/// @throws RequestError
+void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::path& target);
+
+/// Shades a range of a run's receivers.
+/// @param plan    identity of the run
+/// @param target  gets the results, whole or not at all; a range without receivers gives an empty
+///                one
+/// @throws as shade_container()
+/// Memory: at most RunOptions::memory_bytes.
+void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t plan,
+                 const std::filesystem::path& target, Progress& progress);
+
+/// Writes the file of points that shade_container() writes, from the results of all ranges.
+/// @param results  of the ranges in their order
+/// @throws DataError when results are damaged, or of another run, scene or range; as
+///         shade_container()
+void collect_shading(const ShadeRequest& request, const std::vector<std::filesystem::path>& results,
+                     std::uint64_t plan, const std::filesystem::path& target, Progress& progress);
+
+}  // namespace ptc
