@@ -1,18 +1,12 @@
 #include "engine/pipeline/temporary_container.h"
 
-#include <unistd.h>
-
-#include <atomic>
-
-#include <fmt/format.h>
-
 #include "engine/io/file/file.h"
+#include "engine/io/file/temporary_name.h"
 
 namespace ptc {
 
 std::filesystem::path temporary_container_path(const std::filesystem::path& directory) {
-  static std::atomic<unsigned> made = 0;
-  return directory / fmt::format(".ptcx-{}-{}.ptcx", getpid(), ++made);
+  return temporary_name(directory / "scene") += ".ptcx";
 }
 
 std::unique_ptr<ContainerReader> make_temporary_container(

@@ -9,7 +9,8 @@
 
 namespace ptc {
 
-/// Returns a path for a temporary container, another one for each call and process.
+/// Returns a path for a temporary container, another one for each call, process and machine:
+/// temporary_name() with the ending .ptcx.
 [[nodiscard]] std::filesystem::path temporary_container_path(
     const std::filesystem::path& directory);
 
