@@ -194,7 +194,7 @@ class Place:
                 wrong.append("exit 0 without the new file")
         if run.code > 0 and not re.search(f"^{self.scenario.command[0]}: ", run.errors, re.M):
             wrong.append("no message")
-        names = r"\.(.+\.tmp-[\w.]+-\d+-[0-9a-f]{8}-\d+|ptcx-\d+-\d+\.ptcx)"
+        names = r"\..+\.tmp-[\w.]+-\d+-[0-9a-f]{8}-\d+(\.ptcx)?"
         keeps = self.scenario.keeps and (run.code != 0 or (may_leave and run.call))
         kept = r"o\.ptcx\.resume(-.+)?" if keeps else "$^"
         left = [name for name in self.leftovers()
