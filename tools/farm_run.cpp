@@ -8,16 +8,15 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
-#include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 #include <system_error>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/file/text_file.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "tools/common.h"
 #include "tools/farm_retry.h"
@@ -163,14 +162,12 @@ class Runner {
 
   /// @param code  as a shell has it
   void fail(const FarmTask& task, int code) {
-    std::ifstream log(log_of(task));
-    std::stringstream text;
-    text << log.rdbuf();
+    std::string text = text_of_log(log_of(task));
     if (code > kSignalCode)
-      text << fmt::format("{}: it was ended by signal {}\n", task.name(), code - kSignalCode);
-    note_failure(plan_, task, text.str());
+      text += fmt::format("{}: it was ended by signal {}\n", task.name(), code - kSignalCode);
+    note_failure(plan_, task, text);
     result_.failed.push_back(task.name());
-    result_.errors += fmt::format("{} failed:\n{}", task.name(), text.str());
+    result_.errors += fmt::format("{} failed:\n{}", task.name(), text);
     if (result_.exit_code == 0)
       result_.exit_code = code > kSignalCode ? static_cast<int>(kSystem) : code;
   }

@@ -5,12 +5,12 @@
 #include <fstream>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "engine/io/file/text_file.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "tools/slurm_arrays.h"
 #include "tools/slurm_jobs.h"
@@ -45,12 +45,9 @@ std::optional<double> rate_of(const FarmPlan& plan, double done) {
   return passed > 0 && more > 0 ? std::optional(more / passed) : std::nullopt;
 }
 
-/// Returns the end of a file; empty where there is none.
+/// Returns the end of a log; empty where there is none.
 std::string tail_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::stringstream all;
-  all << file.rdbuf();
-  const std::string text = all.str();
+  const std::string text = text_of_log(path);
   if (text.size() <= kTailBytes) return text;
   const std::size_t line = text.find('\n', text.size() - kTailBytes);
   return "...\n" + text.substr(line == std::string::npos ? text.size() - kTailBytes : line + 1);

@@ -13,6 +13,7 @@
 #include <fmt/ranges.h>
 
 #include "engine/io/file/file.h"
+#include "engine/io/file/text_file.h"
 #include "engine/pipeline/farm/plan.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "format/node_page.h"
@@ -309,10 +310,7 @@ ptc::Outcome export_tasks(const Arguments& arguments) {
   const ptc::FarmPlan plan = only_plan(arguments);
   if (ptc::same_name(arguments.output, plan.file))
     throw CLI::ValidationError("--output", "it is the plan itself");
-  const std::string text = ptc::exported(plan, arguments.scheduler);
-  ptc::OutputFile file(arguments.output);
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
+  ptc::write_text(arguments.output, ptc::exported(plan, arguments.scheduler));
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["output"] = arguments.output.string();
   outcome.summary = fmt::format("{}: {} tasks\n", arguments.output.string(), plan.tasks.size());

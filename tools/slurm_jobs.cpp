@@ -9,17 +9,17 @@
 #include <cstdio>
 #include <memory>
 #include <set>
-#include <span>
 #include <sstream>
 #include <system_error>
 #include <thread>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/file/file.h"
 #include "engine/io/file/state_file.h"
+#include "engine/io/file/text_file.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "tools/farm_status.h"
 #include "tools/slurm_arrays.h"
@@ -70,12 +70,6 @@ std::filesystem::path jobs_file(const FarmPlan& plan) {
   return slurm_folder(plan) / "jobs.json";
 }
 
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  OutputFile file(path);
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
-}
-
 void write_jobs(const FarmPlan& plan, const std::vector<Job>& jobs) {
   Json list = Json::array();
   for (const Job& job : jobs) list.push_back({{"id", job.id}, {"name", job.name}});
@@ -86,11 +80,8 @@ std::vector<Job> read_jobs(const FarmPlan& plan) {
   const std::filesystem::path path = jobs_file(plan);
   std::vector<Job> jobs;
   if (!std::filesystem::exists(path)) return jobs;
-  const InputFile file(path);
-  std::string text(static_cast<std::size_t>(file.size()), '\0');
-  file.read_at(0, std::as_writable_bytes(std::span(text)));
   try {
-    const Json json = Json::parse(text);
+    const Json json = Json::parse(read_text(path));
     if (json.at("format") != kFormat) throw DataError(path.string() + ": it lists no jobs");
     for (const Json& job : json.at("jobs")) {
       jobs.push_back({job.at("id"), job.at("name")});
@@ -139,12 +130,6 @@ std::set<std::string> ids_of(const std::vector<Queued>& list) {
   return ids;
 }
 
-std::string joined(const std::set<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 /// Submits an array. @return  its number
 std::string submit(const FarmPlan& plan, const SlurmArray& array,
                    const std::vector<std::string>& after) {
@@ -179,8 +164,8 @@ std::vector<std::string> submit_to_slurm(const FarmPlan& plan) {
   std::filesystem::create_directories(plan.folder() / "log");
   const FileLock lock(slurm_folder(plan) / "lock");
   if (const auto waiting = ids_of(queued(read_jobs(plan))); !waiting.empty()) {
-    throw DataError(plan.file.string() + ": jobs " + joined(waiting) +
-                    " of it wait or run: cancel them first");
+    throw DataError(fmt::format("{}: jobs {} of it wait or run: cancel them first",
+                                plan.file.string(), fmt::join(waiting, ", ")));
   }
 
   // Submit a kind after the other
@@ -268,7 +253,7 @@ std::vector<std::string> cancel_in_slurm(const FarmPlan& plan) {
   for (std::set<std::string> left = ids; !left.empty(); left = ids_of(queued(jobs))) {
     if (std::chrono::steady_clock::now() > end) {
       throw std::system_error(std::make_error_code(std::errc::timed_out),
-                              "jobs " + joined(left) + " do not end");
+                              fmt::format("jobs {} do not end", fmt::join(left, ", ")));
     }
     std::vector<std::string> words{"scancel"};
     words.insert(words.end(), left.begin(), left.end());

@@ -9,10 +9,10 @@ namespace ptc {
 
 /// The state of a file, as it can be compared without reading all of it.
 ///
-/// That of a container is the checksum of its superblock, which covers the checksums of all pages:
-/// no change goes unseen, and a copy of the same bytes is the same. Of any other file it is the
-/// time of the last change and the checksum of the first and the last 64 KiB: a change between them
-/// goes unseen if it leaves the length and the time as they were.
+/// The state of a container is the checksum of its superblock, which covers the checksums of all
+/// pages: no change goes unseen, and a copy of the same bytes is the same. The state of any other
+/// file is the time of the last change and the checksum of the first and the last 64 KiB: a change
+/// between them goes unseen if it leaves the length and the time as they were.
 struct InputState {
   std::filesystem::path path;
   std::uint64_t bytes = 0;

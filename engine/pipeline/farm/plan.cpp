@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
-#include "engine/io/file/file.h"
+#include "engine/io/file/text_file.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
@@ -361,15 +361,11 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
 void write_plan(FarmPlan& plan) {
   const std::string text = plan_to_json(plan);
   plan.id = xxh3_64(std::as_bytes(std::span(text)));
-  OutputFile file(plan.file);
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
+  write_text(plan.file, text);
 }
 
 FarmPlan read_plan(const std::filesystem::path& file, const TaskCommand& command) {
-  const InputFile in(file);
-  std::string text(static_cast<std::size_t>(in.size()), '\0');
-  in.read_at(0, std::as_writable_bytes(std::span(text)));
+  const std::string text = read_text(file);
   FarmPlan plan = plan_from_json(text, std::filesystem::absolute(file));
   try {
     check_plan(plan);

@@ -5,8 +5,6 @@
 //   part.0 ...       a range of all inputs --> sorted, built            scene.parts/0.ptcx, its
 //   join             edges of all parts --> the top of the tree         scene.ptcx
 //   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
-//   collect          points, light of all ranges --> shaded points      shaded.ply
-//   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
 //   collect          the light of all ranges --> shaded points          shaded.ply
 //
 // Every task is one command line. It can be run again at any time, publishes what it makes by

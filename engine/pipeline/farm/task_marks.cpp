@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <fstream>
-#include <span>
-#include <sstream>
 #include <vector>
 
-#include "engine/io/file/file.h"
 #include "engine/io/file/state_file.h"
+#include "engine/io/file/text_file.h"
 
 namespace ptc {
 namespace {
@@ -55,17 +52,12 @@ TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
 }
 
 std::string failure_of(const FarmPlan& plan, const FarmTask& task) {
-  std::ifstream file(failed_mark(plan, task));
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
+  return text_of_log(failed_mark(plan, task));
 }
 
 void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string& text) {
   std::filesystem::create_directories(failed_mark(plan, task).parent_path());
-  OutputFile file(failed_mark(plan, task));
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
+  write_text(failed_mark(plan, task), text);
 }
 
 void forget_failure(const FarmPlan& plan, const FarmTask& task) {

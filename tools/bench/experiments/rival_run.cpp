@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/file/text_file.h"
 #include "tools/bench/report/report.h"
 #include "tools/bench/scenes/work_file.h"
 

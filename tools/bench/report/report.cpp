@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "engine/io/file/file.h"
+#include "engine/io/file/text_file.h"
 
 namespace ptc::bench {
 
@@ -22,12 +22,6 @@ void add_panel(Chart& chart, ChartPanel panel) {
 
 std::string file_name(const Report& report, const std::string& part) {
   return part.empty() ? report.name : report.name + "-" + part;
-}
-
-void write_text(const std::filesystem::path& path, const std::string& text) {
-  OutputFile file(path);
-  file.append(std::as_bytes(std::span(text)));
-  file.publish();
 }
 
 nlohmann::ordered_json facts_of(const Report& report) {

@@ -53,9 +53,6 @@ void add_panel(Chart& chart, ChartPanel panel);
 /// The name of a file without its ending: NAME-PART, or NAME where the part is empty.
 [[nodiscard]] std::string file_name(const Report& report, const std::string& part);
 
-/// Writes a file, which is published whole or not at all. @throws std::system_error
-void write_text(const std::filesystem::path& path, const std::string& text);
-
 /// Returns {"rows": [...], "TABLE": [...]}: json_of() of each table under the table's name.
 [[nodiscard]] nlohmann::ordered_json facts_of(const Report& report);
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "engine/io/file/text_file.h"
+
 namespace ptc::bench {
 namespace {
 
