@@ -148,14 +148,6 @@ bool all_below(const std::byte* column, std::size_t count, T limit) noexcept {
   return (seen & kTop) == 0;
 }
 
-// Says whether a point has numbers that a page may hold; radiance may be a negative zero.
-[[maybe_unused]] bool storable(const PointRecord& point) noexcept {
-  const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
-  return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
-         point.flags == 0 && std::ranges::all_of(point.radiance, usual) &&
-         std::ranges::all_of(point.emission, usual);
-}
-
 // Writes columns of `count` numbers.
 class Columns {
  public:
@@ -179,11 +171,18 @@ std::uint32_t points_per_page(const FileHeader& file) noexcept {
   return payload_limit(file.page_shift) / file.point_bytes / 8 * 8;
 }
 
+bool is_storable(const PointRecord& point) noexcept {
+  const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
+  return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
+         point.flags == 0 && std::ranges::all_of(point.radiance, usual) &&
+         std::ranges::all_of(point.emission, usual);
+}
+
 std::vector<std::byte> encode_point_page(std::span<const PointRecord> points,
                                          std::uint8_t point_bytes) {
   if (points.empty()) throw std::invalid_argument("encode_point_page: no points");
   assert(std::ranges::is_sorted(points, {}, &PointRecord::key) &&
-         std::ranges::all_of(points, storable));
+         std::ranges::all_of(points, is_storable));
   Columns columns(points.size(), point_bytes);
   const auto not_negative = [](std::uint16_t half) {  // -0 becomes 0
     return half == 0x8000 ? std::uint16_t{0} : half;

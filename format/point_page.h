@@ -16,6 +16,10 @@ namespace ptc {
 /// Returns the number of points in a full point page, a multiple of 8.
 [[nodiscard]] std::uint32_t points_per_page(const FileHeader& file) noexcept;
 
+/// Says whether a page may hold the numbers of a point: radius, radiance and emission are finite
+/// and not negative, though colours may be negative zeros, and flags are 0.
+[[nodiscard]] bool is_storable(const PointRecord& point) noexcept;
+
 /// Encodes the payload of a point page: columns of n values each, one after another. Positions are
 /// lossless. A negative zero becomes zero.
 ///
@@ -24,8 +28,7 @@ namespace ptc {
 ///   f32 radius[n]   i16 normal_u[n] normal_v[n]   u16 radiance_r[n] _g[n] _b[n] (half)
 ///   u8 albedo_r[n] _g[n] _b[n]   u8 flags[n]       34 bytes a point
 ///   u16 emission_r[n] _g[n] _b[n] (half)           6 more where points may emit light
-/// @param points       1 to points_per_page() points by ascending key; radius, radiance and
-///                     emission are finite and not negative, flags are 0
+/// @param points       1 to points_per_page() points by ascending key, all is_storable()
 /// @param point_bytes  FileHeader::point_bytes; kPointBytes leaves emission out
 /// @throws std::invalid_argument when there are no points
 [[nodiscard]] std::vector<std::byte> encode_point_page(std::span<const PointRecord> points,

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -15,6 +14,7 @@
 #include "engine/io/file/temporary_name.h"
 #include "engine/sort/record_values.h"
 #include "format/checksum.h"
+#include "format/point_page.h"
 
 namespace ptc {
 namespace {
@@ -23,12 +23,9 @@ constexpr std::size_t kMinBlock = 64, kMaxBlock = std::size_t{1} << 14;  // poin
 constexpr std::size_t kEndBytes =
     3 * sizeof(std::uint64_t);  // place, length, checksum of the table
 
-/// Says whether a container may hold a point. Colours may be negative zeros.
-bool storable(const PointRecord& point) noexcept {
-  const auto usual = [](std::uint16_t half) { return half < 0x7c00 || half == 0x8000; };
-  return point.radius >= 0 && point.radius <= std::numeric_limits<float>::max() &&
-         point.flags == 0 && (point.key.high | point.key.low) >> 63 == 0 &&
-         std::ranges::all_of(point.radiance, usual) && std::ranges::all_of(point.emission, usual);
+/// Says whether a container may hold a point.
+bool fits_container(const PointRecord& point) noexcept {
+  return is_storable(point) && (point.key.high | point.key.low) >> 63 == 0;
 }
 
 }  // namespace
@@ -200,7 +197,7 @@ bool RangeReader::next() {
   points_.resize(count);
   std::memcpy(points_.data(), bytes_.data(), count * sizeof(PointRecord));
   for (std::size_t i = 0; i < count; ++i) {
-    if (!storable(points_[i])) {
+    if (!fits_container(points_[i])) {
       throw DataError(fmt::format(
           "{}: offset {}: point {}: radius, radiance and emission must be finite and not negative, "
           "the key below 2^126 and the flags 0",
