@@ -172,7 +172,7 @@ void TreeEdges::save(StateWriter& state) const {
 
 void TreeEdges::load(StateReader& state, std::uint32_t node_pages) {
   const auto knows = [&](std::uint32_t page) { return page < node_pages; };
-  points = state.get_count((std::uint64_t{1} << 48) - 1);
+  points = state.get_count(kMaxTreePoints);
   root = {.interior = true, .page = state.get<std::uint32_t>(), .slot = state.get<std::uint16_t>()};
   state.require(knows(root.page), "the root of the edges does not exist");
   first = load_way(state, knows, points);

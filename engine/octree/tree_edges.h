@@ -21,6 +21,9 @@
 
 namespace ptc {
 
+/// The maximum number of points of a tree: a leaf refers to its first one by 48 bits.
+inline constexpr std::uint64_t kMaxTreePoints = (std::uint64_t{1} << 48) - 1;
+
 /// The two edges of a tree.
 struct TreeEdges {
   std::uint64_t points = 0;  ///< of the tree, at least 1
@@ -38,9 +41,9 @@ struct TreeEdges {
   void save(StateWriter& state) const;
   /// Loads edges that save() saved.
   /// @param node_pages  of the container
-  /// @throws DataError when they are no edges of a tree: the top over them may then be wrong, but
-  /// is
-  ///         one that pages can hold
+  /// @throws DataError when they are no edges of a tree. Wrong edges that it does not see may give
+  /// a
+  ///         wrong top over them, but one that pages can hold
   void load(StateReader& state, std::uint32_t node_pages);
 };
 

@@ -22,7 +22,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kMaxPoints = (std::uint64_t{1} << 48) - 1;  // that a leaf can refer to
 constexpr std::uint32_t kMaxPages = std::numeric_limits<std::uint32_t>::max();
 
 /// Returns the name of a part as the scene records it.
@@ -98,7 +97,7 @@ class Join {
       scene_.bounds_high[k] = both(scene_.bounds_high[k], s.bounds_high[k], std::ranges::max);
       scene_.flux[k] += s.flux[k];
     }
-    if (s.points > kMaxPoints - scene_.points)
+    if (s.points > kMaxTreePoints - scene_.points)
       throw DataError(path.string() + ": with it, the scene has 2^48 points or more");
     scene_.points += s.points;
     scene_.nodes += s.nodes;
