@@ -25,6 +25,13 @@ namespace ptc {
 /// of this.
 inline constexpr std::size_t kReceiverBatch = 16 * Shader::kBlock;
 
+/// Returns the number of points that a request selects. @param count  that it asks for; 0: all
+[[nodiscard]] inline std::uint64_t selected_of(const ContainerReader& container,
+                                               std::uint64_t count) {
+  const std::uint64_t all = container.superblock().points;
+  return count == 0 ? all : std::min(count, all);
+}
+
 /// An even selection of a container's points, in their order and in blocks.
 ///
 /// Point i of `all` is selected when a multiple of all / wanted falls on it. share_ counts this in

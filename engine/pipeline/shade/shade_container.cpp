@@ -62,7 +62,7 @@ struct OpenReceivers {
                 const Lighting& lighting, Progress& progress)
       : other(open(request, target, progress, las_records)),
         container(other ? *other : lighting.scene()),
-        wanted(std::min(request.count == 0 ? all() : request.count, all())),
+        wanted(selected_of(container, request.count)),
         lost(other ? nullptr : lighting.lost()),
         groups(groups_for(target)),
         points(lost ? count_whole() : wanted) {}

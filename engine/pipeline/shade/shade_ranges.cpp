@@ -37,11 +37,6 @@ struct Receivers {
   std::uint64_t first = 0, end = 0;
 };
 
-std::uint64_t wanted_of(const ShadeRequest& request, const ContainerReader& scene) {
-  const std::uint64_t all = scene.superblock().points;
-  return std::min(request.count == 0 ? all : request.count, all);
-}
-
 /// Returns the receivers of a range: whole batches, but for the last one of all.
 Receivers receivers_of(std::uint64_t wanted, RangeNumber range) {
   const std::uint64_t batches = (wanted + kReceiverBatch - 1) / kReceiverBatch;
@@ -125,7 +120,7 @@ void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t p
   lighting.tune({});
 
   // Shade the range
-  const std::uint64_t wanted = wanted_of(request, scene);
+  const std::uint64_t wanted = selected_of(scene, request.count);
   const Receivers receivers = receivers_of(wanted, range);
   OutputFile file(target);
   const Head head = head_of(plan, scene, receivers);
@@ -160,7 +155,7 @@ void collect_shading(const ShadeRequest& request, const std::vector<std::filesys
   MemoryBudget budget = budget_of(request.run.memory_bytes, "collecting");
   charge_directory(budget, scene);
   budget.require();
-  const std::uint64_t wanted = wanted_of(request, scene);
+  const std::uint64_t wanted = selected_of(scene, request.count);
   PointWriteInfo info = shaded_points(scene, wanted, settings_text(request, request.gather, 0),
                                       request.colour_from, output_format(target));
   note_changed_values(target, info, progress);
