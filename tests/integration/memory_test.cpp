@@ -85,6 +85,29 @@ TEST_CASE(
   CHECK(building(some, 12, 1) - least == directory(some) - kMinSortBytes);
 }
 
+TEST_CASE("memory: the cap of a build covers an adapted spacing, however many surfels it makes",
+          "[integration][memory]") {
+  const TemporaryDirectory dir;
+  Mesh square;
+  square.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  square.triangles = {{0, 1, 2}, {0, 2, 3}};
+  square.materials = {{.name = "white"}};
+  square.material_of = {0, 0};
+  BuildRequest request{.mesh = std::make_shared<const Mesh>(square)};
+  const auto least = [&](double spacing, bool adapts) {
+    return static_cast<double>(min_cap([&](std::uint64_t bytes) {
+      request.sampling.spacing = spacing;
+      request.sampling.adapts = adapts;
+      request.run = {.memory_bytes = bytes, .threads = 1};
+      begin_build(request, dir / "o.ptcx");
+    }));
+  };
+  constexpr double kSome = 1e6, kMore = 4e6;  // surfels
+  const double even = least(1e-3, false), adapted = least(1e-3, true), finer = least(5e-4, true);
+  CHECK(adapted - even == Approx(32 * kSome).margin(1000));
+  CHECK(finer - adapted == Approx((32 + 0.024) * (kMore - kSome)).margin(1000));
+}
+
 TEST_CASE("memory: the cap of a build covers the directory of points that emit light",
           "[integration][memory]") {
   const TemporaryDirectory dir;

@@ -348,8 +348,10 @@ class Build {
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
       charge_mesh(budget, lit->mesh, &lit->rays);
-      const std::uint64_t fixed = sampling_bytes(
-          lit->mesh.triangles.size(), request_.sampling.count, request_.sampling.adapts, 0);
+      const std::uint64_t surfels =
+          request_.sampling.spacing > 0 ? points_of(*lit) : request_.sampling.count;
+      const std::uint64_t fixed =
+          sampling_bytes(lit->mesh.triangles.size(), surfels, request_.sampling.adapts, 0);
       const std::uint64_t writers =
           ContainerWriter::writing_bytes(request_.page_shift, executor_.threads()) -
           ContainerWriter::writing_bytes(request_.page_shift, 1);
@@ -360,9 +362,8 @@ class Build {
     if (const StreamedMeshes* streamed = inputs.streamed.get()) {
       if (request_.sampling.adapts) {
         progress_.note(
-            "the meshes do not fit in memory: their surfels are spaced evenly, because to adapt "
-            "the "
-            "spacing takes rays at all of them");
+            "the meshes do not fit in memory: their surfels are spaced evenly, because an adapted "
+            "spacing needs rays at all of them");
       }
       budget.charge("the meshes", streamed->parts.bytes());
       std::vector<Material> materials = streamed->parts.materials();
