@@ -148,7 +148,7 @@ TEST_CASE("temporary name: no two are the same, and what ended processes left is
   };
   CHECK(random_of(a) != random_of(b));
 
-  // That of a child is a leftover, one of this process is none, nor are other files
+  // A file that a child has left is a leftover; files of this process and others are none
   CHECK(is_leftover(scratch.file(a, "left")));
   CHECK_FALSE(is_leftover(scratch.file(temporary_name(target).filename().string(), "in use")));
   for (const char* name : {"out", ".out.tmp-", ".out.tmp-host", ".out.tmp-host-x-0-0"})
