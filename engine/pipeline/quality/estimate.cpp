@@ -233,20 +233,13 @@ Estimator::Estimator(const ContainerReader& scene, const ShadeOptions& options,
 
 std::vector<Shading> Estimator::shade_compared(const SceneView& view, std::span<const Pilot> pilots,
                                                unsigned turn, const Executor& executor) const {
-  std::vector<std::unique_ptr<DirectionGrid>> grids;
-  for (unsigned i = 0; i < options_.variants; ++i) {
-    grids.push_back(std::make_unique<DirectionGrid>(options_.gather.resolution, nullptr, i));
-  }
-  std::vector<std::unique_ptr<Gather>> gathers(executor.threads());
-  std::vector<std::vector<Shading>> compared(pilots.size());
-  executor.for_each(pilots.size(), [&](std::size_t i, unsigned thread) {
-    if (!gathers[thread])
-      gathers[thread] = std::make_unique<Gather>(view, *cache_, options_.gather);
-    compared[i] = shade_some(*gathers[thread], pilots[i], pilots[i].compared,
-                             *grids[(pilots[i].variant + turn) % grids.size()]);
-  });
+  const auto compared = [&](std::size_t i) -> std::span<const Compared> {
+    return pilots[i].compared;
+  };
+  const ShadedPilots shaded = shade_pilots(view, *cache_, options_, options_.gather, pilots,
+                                           every_pilot(pilots), compared, executor, turn);
   std::vector<Shading> all;
-  for (const std::vector<Shading>& some : compared) all.insert(all.end(), some.begin(), some.end());
+  for (const auto& some : shaded.results) all.insert(all.end(), some.begin(), some.end());
   return all;
 }
 

@@ -13,12 +13,15 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <set>
 #include <span>
 #include <vector>
 
+#include "engine/base/executor.h"
 #include "engine/shade/gather/gather.h"
+#include "engine/shade/shader.h"
 
 namespace ptc {
 
@@ -74,12 +77,28 @@ void add_pilots(std::vector<Pilot>& pilots, std::vector<Receiver> block, unsigne
 /// Returns the compared receivers of all pilots, in order.
 [[nodiscard]] std::vector<Receiver> compared_of(std::span<const Pilot> pilots);
 
-/// Shades some receivers of a pilot's block as the run does. Gather::work() tells what they took.
-/// @param grid  of the pilot's variant
-/// @return      one result for each of them, in their order
-[[nodiscard]] std::vector<Shading> shade_some(Gather& gather, const Pilot& pilot,
-                                              std::span<const Compared> some,
-                                              const DirectionGrid& grid);
+/// What some receivers of pilots get, pilot by pilot.
+struct ShadedPilots {
+  std::vector<std::vector<Shading>> results;  ///< one for each receiver, in their order
+  std::vector<GatherWork> works;              ///< what they take
+  std::uint64_t receivers = 0;                ///< that were shaded, those without results as well
+};
+
+/// Shades some receivers of pilots as the run does, on all threads.
+/// @param cache    for ShadeOptions::readers() of each thread
+/// @param options  of the run; `gather` takes the place of its settings
+/// @param numbers  of the pilots
+/// @param some_of  returns the receivers of a pilot: some_of(number)
+/// @param turn     is added to the variants of the pilots
+[[nodiscard]] ShadedPilots shade_pilots(
+    const SceneView& view, PageCache& cache, const ShadeOptions& options,
+    const GatherOptions& gather, std::span<const Pilot> pilots,
+    std::span<const std::size_t> numbers,
+    const std::function<std::span<const Compared>(std::size_t)>& some_of, const Executor& executor,
+    unsigned turn = 0);
+
+/// Returns the numbers of all pilots.
+[[nodiscard]] std::vector<std::size_t> every_pilot(std::span<const Pilot> pilots);
 
 /// A set of receivers; those at the same position count as one.
 class ReceiverPlaces {

@@ -18,7 +18,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numeric>
 #include <random>
 
 #include "engine/base/memory.h"
@@ -70,9 +69,6 @@ struct Measured {
   double low = 0, high = 0;
 };
 
-// The rungs at which candidates are shaded
-constexpr std::array<std::size_t, 2> kSurveyed{0, 3};
-
 /// The search of tune() and climb(): survey() if it chooses what is compared, trace, then
 /// begin_shading(), then choose() and measure(), and at the end choose_rays().
 class Tuner {
@@ -91,7 +87,7 @@ class Tuner {
   /// Chooses among the candidates of all pilots those that are compared.
   /// @param pilots  those that it was made for
   void survey(std::span<Pilot> pilots) {
-    const std::vector<std::size_t> all = every_pilot();
+    const std::vector<std::size_t> all = every_pilot(pilots);
     std::vector<std::vector<Compared>> candidates;
     for (const Pilot& pilot : pilots) candidates.push_back(candidates_of(pilot));
     const auto of = [&](std::size_t i) -> std::span<const Compared> { return candidates[i]; };
@@ -124,7 +120,7 @@ class Tuner {
     for (std::size_t i = 0; i < pilots_.size(); ++i) {
       for (std::size_t at = pilots_[i].begin; at < pilots_[i].end; ++at) whole[i].push_back({at});
     }
-    shade(rung, every_pilot(),
+    shade(rung, every_pilot(pilots_),
           [&](std::size_t i) -> std::span<const Compared> { return whole[i]; });
   }
 
@@ -180,13 +176,6 @@ class Tuner {
 
  private:
   static constexpr std::size_t kChoosing = 0, kConfirming = 1;  // even and odd pilots
-
-  /// Returns the numbers of all pilots.
-  [[nodiscard]] std::vector<std::size_t> every_pilot() const {
-    std::vector<std::size_t> all(pilots_.size());
-    std::iota(all.begin(), all.end(), 0);
-    return all;
-  }
 
   /// Returns the cheapest rung that meets `asked` at the choosing pilots, provided that errors fall
   /// along the ladder; the size of the ladder when there is none.
@@ -264,29 +253,13 @@ class Tuner {
   template <class SomeOf>
   std::vector<std::vector<Shading>> shade(std::size_t rung, std::span<const std::size_t> pilots,
                                           const SomeOf& some_of) {
-    const GatherOptions gather = ladder()[rung].options(options_.gather);
-    const VisibilityMaker visibility = options_.visibility_of_sky();
-    std::vector<std::unique_ptr<DirectionGrid>> grids;
-    for (unsigned i = 0; i < std::max(1U, options_.variants); ++i) {
-      grids.push_back(std::make_unique<DirectionGrid>(gather.resolution, options_.sky, i));
-    }
-    std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
-    std::vector<std::vector<Shading>> results(pilots.size());
-    std::vector<GatherWork> works(pilots.size());
-    executor_.for_each(pilots.size(), [&](std::size_t k, unsigned thread) {
-      if (!gathers[thread])
-        gathers[thread] = std::make_unique<Gather>(view_, *cache_, gather, visibility);
-      const Pilot& pilot = pilots_[pilots[k]];
-      results[k] = shade_some(*gathers[thread], pilot, some_of(pilots[k]),
-                              *grids[pilot.variant % grids.size()]);
-      works[k] = gathers[thread]->work();
-    });
+    ShadedPilots shaded =
+        shade_pilots(view_, *cache_, options_, ladder()[rung].options(options_.gather), pilots_,
+                     pilots, some_of, executor_);
     // In the order of the pilots: sums of floats must not depend on which thread shades which
-    for (const GatherWork& work : works) works_[rung].add(work);
-    for (const auto& done : gathers) {
-      if (done) shaded_ += done->counts().receivers;
-    }
-    return results;
+    for (const GatherWork& work : shaded.works) works_[rung].add(work);
+    shaded_ += shaded.receivers;
+    return std::move(shaded.results);
   }
 
   /// Returns the errors of each pilot of a part at the results by rays.

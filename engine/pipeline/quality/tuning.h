@@ -9,6 +9,7 @@
 //   rays       as many as the noise at the pilots says, where that costs less
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -68,6 +69,9 @@ struct TuningReport {
   double ray_cpu_seconds = 0;    ///< CPU time of the rays, all threads
   double shade_cpu_seconds = 0;  ///< CPU time of the gathers, all threads
 };
+
+/// The rungs at which candidates are shaded.
+inline constexpr std::array<std::size_t, 2> kSurveyed{0, 3};
 
 /// Seed of the rays of the first receiver of a run that is shaded by rays: far from those of rays
 /// that results are compared with.

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <utility>
 
 #include "engine/parallel/thread_pool.h"
@@ -61,7 +60,7 @@ class Judge {
         options_(options),
         pilots_(std::move(pilots)),
         executor_(executor) {
-    const auto coarse = shade(0, true), fine = shade(3, true);
+    const auto coarse = shade(kSurveyed[0], true), fine = shade(kSurveyed[1], true);
     choose_compared(pilots_, coarse, fine);
     const std::vector<Receiver> twice = two_of_each(compared_of(pilots_));
     traced_.resize(twice.size());
@@ -103,24 +102,17 @@ class Judge {
   std::vector<std::vector<Shading>> shade(std::size_t setting, bool candidates) {
     PageCache cache(scene_, {.memory_bytes = options_.cache_bytes,
                              .threads = executor_.threads() * options_.readers()});
-    const GatherOptions gather = ladder()[setting].options(options_.gather);
-    const DirectionGrid grid(gather.resolution, options_.sky);
-    std::vector<std::unique_ptr<Gather>> gathers(executor_.threads());
-    std::vector<std::vector<Shading>> results(pilots_.size());
-    std::vector<GatherWork> works(pilots_.size());
-    executor_.for_each(pilots_.size(), [&](std::size_t i, unsigned thread) {
-      if (!gathers[thread]) {
-        gathers[thread] =
-            std::make_unique<Gather>(view_, cache, gather, options_.visibility_of_sky());
-      }
-      const std::vector<Compared> some =
-          candidates ? candidates_of(pilots_[i]) : pilots_[i].compared;
-      results[i] = shade_some(*gathers[thread], pilots_[i], some, grid);
-      works[i] = gathers[thread]->work();
-    });
-    if (candidates) return results;
-    for (const GatherWork& work : works) works_[setting].add(work);
-    return results;
+    std::vector<std::vector<Compared>> some;
+    for (const Pilot& pilot : pilots_)
+      some.push_back(candidates ? candidates_of(pilot) : pilot.compared);
+    const auto of = [&](std::size_t i) -> std::span<const Compared> { return some[i]; };
+    ShadedPilots shaded =
+        shade_pilots(view_, cache, options_, ladder()[setting].options(options_.gather), pilots_,
+                     every_pilot(pilots_), of, executor_);
+    if (!candidates) {
+      for (const GatherWork& work : shaded.works) works_[setting].add(work);
+    }
+    return std::move(shaded.results);
   }
 
   [[nodiscard]] double compare(std::span<const Shading> results) const {
