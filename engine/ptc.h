@@ -10,6 +10,7 @@
 #include "engine/pipeline/convert/point_files.h"    // IWYU pragma: export
 #include "engine/pipeline/light/light_container.h"  // IWYU pragma: export
 #include "engine/pipeline/point_input.h"            // IWYU pragma: export
+#include "engine/pipeline/quality/surfel_choice.h"  // IWYU pragma: export
 #include "engine/pipeline/render/render_picture.h"  // IWYU pragma: export
 #include "engine/pipeline/shade/shade_container.h"  // IWYU pragma: export
 #include "engine/sort/external_sort.h"              // IWYU pragma: export

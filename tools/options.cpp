@@ -321,18 +321,23 @@ void apply_preset(const CLI::App& app, Preset preset, LightingRequest& request) 
   }
 }
 
-void add_error_option(CLI::App& app, std::optional<double>& error) {
-  const auto set = [&error](const std::string& text) {
+CLI::Option* add_share(CLI::App& app, const char* name, std::optional<double>& share,
+                       const std::string& help) {
+  const auto set = [name, &share](const std::string& text) {
     const bool percent = text.ends_with('%');
     const auto number =
         parse_number<double>(std::string_view(text).substr(0, text.size() - (percent ? 1 : 0)));
-    const double share = number.value_or(0) / (percent ? 100 : 1);
-    if (!(share > 0 && share <= 1))
-      refuse("--error", text, "a share above 0 and at most 1, such as 2% or 0.02");
-    error = share;
+    const double value = number.value_or(0) / (percent ? 100 : 1);
+    if (!(value > 0 && value <= 1))
+      refuse(name, text, "a share above 0 and at most 1, such as 2% or 0.02");
+    share = value;
   };
-  CLI::Option* option = app.add_option_function<std::string>(
-      "--error", set,
+  return app.add_option_function<std::string>(name, set, help)->type_name("SHARE");
+}
+
+void add_error_option(CLI::App& app, std::optional<double>& error) {
+  CLI::Option* option = add_share(
+      app, "--error", error,
       "Find the cheapest settings whose RMS error is at most SHARE, such as 2%\n"
       "SHARE is a percentage or a number up to 1: 2% and 0.02 are the same. The error is that of "
       "occlusion and of light, each relative to its mean, against rays that are traced at the "
@@ -340,7 +345,7 @@ void add_error_option(CLI::App& app, std::optional<double>& error) {
       "used, or rays where these are cheaper; if none does, the finest are used, and the report "
       "says so. By default the expert "
       "settings hold.");
-  option->type_name("SHARE")->group("Quality");
+  option->group("Quality");
   for (const char* name : {"--solid-angle", "--parallax", "--inflation", "--resolution"}) {
     option->excludes(app.get_option(name));
   }

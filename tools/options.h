@@ -76,6 +76,12 @@ void add_preset(CLI::App& app, Preset& preset);
 /// Sets what a preset stands for, except where an option says otherwise. @pre the app is parsed
 void apply_preset(const CLI::App& app, Preset preset, LightingRequest& request);
 
+/// Declares an option that takes a percentage or a number above 0 and at most 1.
+/// @param name   as "--error"; must outlive the app
+/// @param share  is set by the option
+CLI::Option* add_share(CLI::App& app, const char* name, std::optional<double>& share,
+                       const std::string& help);
+
 /// Declares --error SHARE, which stands for the settings of the gather that trade time for error
 /// and excludes them. @pre add_gather_options() was called
 void add_error_option(CLI::App& app, std::optional<double>& error);

@@ -64,6 +64,7 @@ struct Arguments {
   ptc::CameraArguments camera;
   bool no_default_lights = false;
   std::string format;  ///< of standard input
+  std::optional<double> error;
 };
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
@@ -123,8 +124,22 @@ void declare_sampling(CLI::App& app, Arguments& arguments) {
       ->default_str("")
       ->excludes(points)
       ->group(kGroup);
-  app.add_flag("--adapt", sampling.adapts,
-               "Place more of them where meshes turn or light changes, fewer elsewhere")
+  CLI::Option* adapt =
+      app.add_flag("--adapt", sampling.adapts,
+                   "Place more of them where meshes turn or light changes, fewer elsewhere")
+          ->group(kGroup);
+  ptc::add_share(
+      app, "--error", arguments.error,
+      "Find the fewest surfels whose RMS error is at most SHARE, such as 3%\n"
+      "SHARE is a percentage or a number up to 1: 3% and 0.03 are the same. The error is "
+      "that of occlusion and of light, each relative to its mean, by rays at the surfels "
+      "against rays at the meshes along the same directions, at places all over the "
+      "meshes, or over the camera's picture. Numbers of surfels, even or adapted, are "
+      "tried in temporary containers. Where more of them stop making the error smaller, "
+      "the fewest that are as good are taken, and the report says so.")
+      ->excludes(points)
+      ->excludes("--spacing")
+      ->excludes(adapt)
       ->group(kGroup);
 }
 
@@ -224,7 +239,15 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   if (!request.append.empty()) adopt_settings(arguments, command);
   note_options_of_meshes(arguments, command.app(), progress);
   if (request.append.empty()) ptc::note_unknown_up(request.inputs, request.up, progress);
-  const ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
+  ptc::StageSeconds choosing;
+  std::optional<ptc::SurfelChoice> choice;
+  if (arguments.error) {
+    choice = ptc::choose_surfels(request, *arguments.error, arguments.output, choosing, progress);
+    request.sampling.count = choice->taken.count;
+    request.sampling.adapts = choice->taken.adapts;
+  }
+  ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
+  report.seconds.insert(report.seconds.begin(), choosing.begin(), choosing.end());
 
   // Report.
   const ptc::Superblock& made = report.superblock;
@@ -233,11 +256,14 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   if (request.resume) facts["resumed_points"] = report.resumed_points;
   facts["space"] = ptc::facts_of(report.space);
   facts["sort"] = ptc::facts_of(report.sort);
+  if (choice) facts["error"] = ptc::facts_of(*choice);
   facts["seconds"] = ptc::facts_of(report.seconds);
-  return {facts, fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}",
-                             arguments.output.string(), made.points, made.nodes, made.levels,
-                             made.page_count, ptc::bytes_text(made.file_bytes),
-                             ptc::total_seconds(report.seconds), ptc::stages_text(report.seconds))};
+  return {
+      facts,
+      fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}{}",
+                  arguments.output.string(), made.points, made.nodes, made.levels, made.page_count,
+                  ptc::bytes_text(made.file_bytes), ptc::total_seconds(report.seconds),
+                  choice ? ptc::choice_text(*choice) : "", ptc::stages_text(report.seconds))};
 }
 
 }  // namespace

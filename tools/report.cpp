@@ -56,6 +56,22 @@ ordered_json facts_of(const EstimateWorth& worth) {
           {"within_twice", worth.within_twice}};
 }
 
+ordered_json facts_of(const SurfelTrial& trial) {
+  return {{"count", trial.count},
+          {"adapts", trial.adapts},
+          {"points", trial.points},
+          {"bytes", trial.bytes},
+          {"measured", facts_of(trial.found.error)},
+          {"low", trial.found.low},
+          {"high", trial.found.high},
+          {"cpu_seconds", trial.cpu_seconds}};
+}
+
+/// An error with its bounds: "2.31 % [2.05, 2.60]".
+std::string bounded_text(double error, double low, double high) {
+  return fmt::format("{:.2f} % [{:.2f}, {:.2f}]", 100 * error, 100 * low, 100 * high);
+}
+
 ordered_json facts_of(const EstimateReport& estimate) {
   return {{"pilots", estimate.pilots}, {"cpu_seconds", estimate.cpu_seconds}};
 }
@@ -84,9 +100,7 @@ std::string tuning_text(const TuningReport& tuning) {
   const GatherOptions& g = tuning.gather;
   const std::string setting =
       fmt::format("{} sr, {} rad, {} pixels", g.solid_angle, g.parallax, g.resolution);
-  const double measured = 100 * tuning.measured.relative();
-  const std::string with_bounds =
-      fmt::format("{:.2f} % [{:.2f}, {:.2f}]", measured, 100 * tuning.low, 100 * tuning.high);
+  const std::string with_bounds = bounded_text(tuning.measured.relative(), tuning.low, tuning.high);
   if (tuning.receiver_rays > 0) {
     return fmt::format(
         "  error: {:.4g} % asked, {} measured at {} pilot receivers, shaded by {} rays "
@@ -102,7 +116,7 @@ std::string tuning_text(const TuningReport& tuning) {
   }
   // The finest setting is not met when a resample of the pilots in 20 is above what is asked
   // (spec/shading.md#error), even where their own error is below.
-  if (measured <= 100 * tuning.asked) {
+  if (tuning.measured.relative() <= tuning.asked) {
     return fmt::format(
         "  error: {:.4g} % asked cannot be confirmed: the finest setting ({}) has {} at {} "
         "pilot receivers, but these scatter so much that more than 1 in 20 resamples of a half of "
@@ -270,6 +284,23 @@ ordered_json facts_of(const LightReport& report) {
           {"gather", facts_of(report.gather)},
           {"cache", facts_of(report.cache)},
           {"seconds", facts_of(report.seconds)}};
+}
+
+ordered_json facts_of(const SurfelChoice& choice) {
+  ordered_json facts{{"asked", choice.asked}, {"met", choice.met}};
+  facts.update(facts_of(choice.taken));
+  facts["trials"] = ordered_json::array();
+  for (const SurfelTrial& trial : choice.trials) facts["trials"].push_back(facts_of(trial));
+  return facts;
+}
+
+std::string choice_text(const SurfelChoice& choice) {
+  const BoundedError& found = choice.taken.found;
+  return fmt::format(
+      "  error: {:.4g} % asked{}, {} measured against the meshes with {} {} surfels, {} trials\n",
+      100 * choice.asked, choice.met ? "" : " and not met",
+      bounded_text(found.error.relative(), found.low, found.high), choice.taken.points,
+      choice.taken.adapts ? "adapted" : "even", choice.trials.size());
 }
 
 std::string light_text(const std::string& output, const LightReport& report) {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include <glm/geometric.hpp>
 
@@ -60,33 +61,44 @@ glm::vec3 radiance_of(const RayScene& scene, const DirectLight& light, const Sur
 RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm::dvec3& position,
                      const glm::vec3& normal, unsigned rays, const LightPaths& paths,
                      std::uint64_t seed) {
+  const glm::vec3 unit = glm::normalize(normal);
+  if (!std::isfinite(unit.x + unit.y + unit.z)) return {};
+  const Basis frame(unit);
+  const SquarePoints points(seed);
+  std::vector<glm::vec3> directions(rays);
+  for (std::uint32_t i = 0; i < rays; ++i)
+    directions[i] = frame.to_world(cosine_direction(points.square(i)));
+  return trace_mesh(scene, light, position, normal, directions, paths, seed);
+}
+
+RayTraced trace_mesh(const RayScene& scene, const DirectLight& light, const glm::dvec3& position,
+                     const glm::vec3& normal, std::span<const glm::vec3> directions,
+                     const LightPaths& paths, std::uint64_t seed) {
   // Find where the rays begin.
   RayTraced result;
   const glm::vec3 unit = glm::normalize(normal);
-  if (rays == 0 || !std::isfinite(unit.x + unit.y + unit.z)) return result;
+  if (directions.empty() || !std::isfinite(unit.x + unit.y + unit.z)) return result;
   const std::optional<glm::dvec3> origin = step_off(scene, position, unit);
   if (!origin) {
     result.occlusion = 1;
     return result;
   }
   // Trace the rays and sum what they see.
-  const Basis frame(unit);
-  const SquarePoints points(seed);
   unsigned hits = 0;
-  for (std::uint32_t i = 0; i < rays; ++i) {
-    const glm::vec3 direction = frame.to_world(cosine_direction(points.square(i)));
-    const auto hit = scene.closest(*origin, direction, 0, std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const auto hit =
+        scene.closest(*origin, directions[i], 0, std::numeric_limits<double>::infinity());
     if (hit) {
       ++hits;
       if (paths.bounces > 0)
         result.irradiance +=
             radiance_of(scene, light, *hit, paths, paths.emission, splitmix64(seed) + i);
     } else {
-      result.sky += light.rig().sky.at(direction);
+      result.sky += light.rig().sky.at(directions[i]);
     }
   }
   // Turn the sums into means over the hemisphere.
-  const auto count = static_cast<float>(rays);
+  const auto count = static_cast<float>(directions.size());
   result.occlusion = static_cast<float>(hits) / count;
   result.irradiance *= kPi / count;
   result.sky *= kPi / count;

@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+
+#include <glm/vec3.hpp>
 
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
@@ -48,5 +51,11 @@ struct LightPaths {
 [[nodiscard]] RayTraced trace_mesh(const RayScene& scene, const DirectLight& light,
                                    const glm::dvec3& position, const glm::vec3& normal,
                                    unsigned rays, const LightPaths& paths, std::uint64_t seed);
+/// Traces rays along directions, unit vectors whose density above the normal goes with their
+/// cosine. Otherwise as above: without directions the result is zeros.
+[[nodiscard]] RayTraced trace_mesh(const RayScene& scene, const DirectLight& light,
+                                   const glm::dvec3& position, const glm::vec3& normal,
+                                   std::span<const glm::vec3> directions, const LightPaths& paths,
+                                   std::uint64_t seed);
 
 }  // namespace ptc

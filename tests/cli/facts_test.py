@@ -189,6 +189,25 @@ class Facts(ProgramTest):
                                  ["bounce 1", "bounce 2"] if bounces > 1 else [])
         self.assertFalse([p.name for p in self.here.iterdir() if p.name.startswith(".")])
 
+    def test_a_build_tells_how_many_surfels_an_error_takes(self):
+        few, many = self.here / "few.ptcx", self.here / "many.ptcx"
+        for scene, asked in ((few, 0.5), (many, 0.2)):
+            facts = json.loads(self.succeed("ptcbuild", self.mesh, "--error", f"{100 * asked}%", "-o", scene, "--json").stdout)
+            error = facts["error"]
+            self.assertEqual((error["asked"], error["met"]), (asked, True))
+            self.assertLessEqual(error["high"], asked)
+            self.assertEqual((error["points"], error["bytes"]), (facts["points"], scene.stat().st_size))
+            self.assertEqual({trial["adapts"] for trial in error["trials"][:2]}, {False, True})
+            self.assertIn(error["count"], [trial["count"] for trial in error["trials"]])
+            self.assertIn("choose surfels", facts["seconds"])
+        self.assertLess(few.stat().st_size, many.stat().st_size)
+        summary = self.succeed("ptcbuild", self.mesh, "--error", "20%", "-o", many).stdout
+        self.assertRegex(summary, r"error: 20 % asked, [\d.]+ % \[[\d.]+, [\d.]+\] measured against the meshes with "
+                                  rf"{error['points']} (even|adapted) surfels, {len(error['trials'])} trials")
+        self.assertIn("all inputs are meshes", self.fail_with(2, "ptcbuild", self.cloud, "--error", "5%", "-o", few))
+        for other in (["--points", "1k"], ["--spacing", "0.1"], ["--adapt"]):
+            self.fail_with(2, "ptcbuild", self.mesh, "--error", "5%", *other, "-o", few)
+
     def test_without_bounces_there_is_occlusion_alone(self):
         scene = self.here / "s.ptcx"
         self.succeed("ptcbuild", self.mesh, "--points", "1k", "-o", scene)

@@ -2,8 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 namespace ptc {
+namespace {
+
+// Number of resamples, and the sorted ones whose errors are the bounds: the errors of 19 in 20
+// resamples are below the upper one, and of 19 in 20 above the lower one
+constexpr unsigned kResamples = 200;
+constexpr unsigned kHigh = 190, kLow = kResamples - 1 - kHigh;
+
+}  // namespace
 
 std::vector<Receiver> two_of_each(std::span<const Receiver> receivers) {
   std::vector<Receiver> twice;
@@ -11,10 +20,11 @@ std::vector<Receiver> two_of_each(std::span<const Receiver> receivers) {
   return twice;
 }
 
-void ErrorSums::Quantity::add(double ours, double a, double b, double weight) {
-  square += weight * (ours - a) * (ours - b);
-  difference += weight * (ours - (a + b) / 2);
-  noise += weight * (a - b) * (a - b) / 4;
+void ErrorSums::Quantity::add(double ours_a, double a, double ours_b, double b, double weight) {
+  const double off_a = ours_a - a, off_b = ours_b - b;
+  square += weight * off_a * off_b;
+  difference += weight * (off_a + off_b) / 2;
+  noise += weight * (off_a - off_b) * (off_a - off_b) / 4;
   mean += weight * (a + b) / 2;
 }
 
@@ -25,13 +35,15 @@ void ErrorSums::Quantity::add(const Quantity& other) {
   mean += other.mean;
 }
 
-void ErrorSums::add(const Shading& ours, const Shading& a, const Shading& b, double weight) {
+void ErrorSums::add(const Shading& ours_a, const Shading& a, const Shading& ours_b,
+                    const Shading& b, double weight) {
   const auto value = [](float v) { return static_cast<double>(v); };
   receivers_ += weight;
-  occlusion_.add(value(ours.occlusion), value(a.occlusion), value(b.occlusion), weight);
+  occlusion_.add(value(ours_a.occlusion), value(a.occlusion), value(ours_b.occlusion),
+                 value(b.occlusion), weight);
   for (int c = 0; c < 3; ++c) {
-    irradiance_.add(value(ours.irradiance[c]), value(a.irradiance[c]), value(b.irradiance[c]),
-                    weight / 3);
+    irradiance_.add(value(ours_a.irradiance[c]), value(a.irradiance[c]),
+                    value(ours_b.irradiance[c]), value(b.irradiance[c]), weight / 3);
     sky_ += weight * (value(a.sky[c]) + value(b.sky[c])) / 6;
   }
 }
@@ -58,6 +70,21 @@ CheckError ErrorSums::error() const {
     e.irradiance_noise = rms(irradiance_.noise) / e.irradiance_mean;
   }
   return e;
+}
+
+BoundedError bounded_error(std::span<const ErrorSums> parts) {
+  if (parts.empty()) return {};
+  ErrorSums all;
+  for (const ErrorSums& part : parts) all.add(part);
+  std::mt19937_64 bits;  // with its default seed, so that the bounds are the same each time
+  std::vector<double> samples(kResamples);
+  for (double& sample : samples) {
+    ErrorSums sums;
+    for (std::size_t i = 0; i < parts.size(); ++i) sums.add(parts[bits() % parts.size()]);
+    sample = sums.error().relative();
+  }
+  std::ranges::sort(samples);
+  return {all.error(), samples[kLow], samples[kHigh]};
 }
 
 }  // namespace ptc

@@ -18,7 +18,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <random>
 
 #include "engine/base/memory.h"
 #include "engine/pipeline/quality/candidates.h"
@@ -42,11 +41,6 @@ constexpr std::array kLadder{
     Rung{0.001F, 0.03F, 64, 0.010},
 };
 
-// Number of resamples of the pilots, and the sorted ones whose errors are the bounds: the errors of
-// 19 in 20 resamples are below the upper one, and of 19 in 20 above the lower one
-constexpr unsigned kResamples = 200;
-constexpr unsigned kHigh = 190, kLow = kResamples - 1 - kHigh;
-
 // Microseconds of CPU for a receiver, without the reading of pages, fitted to 81 runs of five
 // scenes and 1,000 to 200,000 receivers: the gather for a block of surfels, a cluster, and the
 // pixels of a direction buffer of 16 a side; rays for the list of a receiver, and for a ray.
@@ -62,12 +56,6 @@ constexpr unsigned kRayStep = 32;
 constexpr unsigned kMostRays = 1U << 17;
 // Seed of results by rays, far from those that they are compared with
 constexpr std::uint64_t kOwnSeed = std::uint64_t{1} << 32;
-
-/// An error at some pilots, and its bounds (TuningReport::low).
-struct Measured {
-  CheckError error;
-  double low = 0, high = 0;
-};
 
 /// The search of tune() and climb(): survey() if it chooses what is compared, trace, then
 /// begin_shading(), then choose() and measure(), and at the end choose_rays().
@@ -128,7 +116,8 @@ class Tuner {
   /// size of the ladder when there is none.
   std::size_t choose(double asked) {
     std::size_t rung = cheapest(asked);
-    while (rung < ladder().size() && bound(errors_of(rung, kConfirming)) > asked) ++rung;
+    while (rung < ladder().size() && bounded_error(errors_of(rung, kConfirming)).high > asked)
+      ++rung;
     return rung;
   }
 
@@ -148,7 +137,8 @@ class Tuner {
       const unsigned count = kRayStep * std::max(1U, steps);
       if (ray_cost(count) >= gather) return 0;
       discs.trace(rays_.compared, count, kOwnSeed, own_, progress);
-      const double error = std::max(bound(own_errors(kChoosing)), bound(own_errors(kConfirming)));
+      const double error = std::max(bounded_error(own_errors(kChoosing)).high,
+                                    bounded_error(own_errors(kConfirming)).high);
       if (error <= asked) return count;
       rays = std::max(kGrowth * count, count * rays_.rays_for(asked) / rays_.rays_for(error));
     }
@@ -156,19 +146,19 @@ class Tuner {
   }
 
   /// Returns the error of the rays that choose_rays() found at the confirming pilots.
-  [[nodiscard]] Measured measure_rays() const {
-    return measured(own_errors(pilots_.size() < 2 ? kChoosing : kConfirming));
+  [[nodiscard]] BoundedError measure_rays() const {
+    return bounded_error(own_errors(pilots_.size() < 2 ? kChoosing : kConfirming));
   }
 
   /// Returns the error of a rung at the confirming pilots.
   /// @param all  at the choosing pilots, too
-  Measured measure(std::size_t rung, bool all) {
+  BoundedError measure(std::size_t rung, bool all) {
     std::vector<ErrorSums> errors = errors_of(rung, kConfirming);
     if (all) {
       const std::vector<ErrorSums>& others = errors_of(rung, kChoosing);
       errors.insert(errors.begin(), others.begin(), others.end());
     }
-    return measured(errors);
+    return bounded_error(errors);
   }
 
   [[nodiscard]] std::uint64_t shaded() const { return shaded_; }
@@ -185,7 +175,7 @@ class Tuner {
     std::size_t at = rung_of(asked);
     while (low < high) {
       at = std::clamp(at, low, high - 1);
-      const double error = bound(errors_of(at, kChoosing));
+      const double error = bounded_error(errors_of(at, kChoosing)).high;
       if (error <= asked) {
         high = at;
       } else {
@@ -202,33 +192,6 @@ class Tuner {
     const auto found =
         std::ranges::find_if(ladder(), [&](const Rung& rung) { return rung.usual_error <= error; });
     return static_cast<std::size_t>(found - ladder().begin());
-  }
-
-  /// Returns the errors of resamples of the pilots with replacement, ascending (Efron 1979).
-  [[nodiscard]] static std::vector<double> resampled(const std::vector<ErrorSums>& errors) {
-    std::mt19937_64 bits;  // with its default seed, so that the errors are the same each time
-    std::vector<double> samples(kResamples);
-    for (double& sample : samples) {
-      ErrorSums sums;
-      for (std::size_t i = 0; i < errors.size(); ++i) sums.add(errors[bits() % errors.size()]);
-      sample = sums.error().relative();
-    }
-    std::ranges::sort(samples);
-    return samples;
-  }
-
-  /// Returns an upper bound on the error of the run, at a confidence of 95 %.
-  [[nodiscard]] static double bound(const std::vector<ErrorSums>& errors) {
-    return errors.empty() ? 0 : resampled(errors)[kHigh];
-  }
-
-  /// Returns the error of all these pilots, with its bounds.
-  [[nodiscard]] static Measured measured(const std::vector<ErrorSums>& errors) {
-    if (errors.empty()) return {};
-    ErrorSums sums;
-    for (const ErrorSums& pilot : errors) sums.add(pilot);
-    const std::vector<double> samples = resampled(errors);
-    return {sums.error(), samples[kLow], samples[kHigh]};
   }
 
   /// Returns the errors of each pilot of a part at a rung, shaded at the first call.
@@ -351,7 +314,7 @@ TuningReport tune(const ContainerReader& scene, const ShadeOptions& options, dou
                       .pilots = tuner.rays().compared.size(),
                       .rays = static_cast<unsigned>(std::lround(2 * tuner.rays().rays)),
                       .ray_cpu_seconds = tracing_done - before};
-  const auto tell = [&](const Measured& measured) {
+  const auto tell = [&](const BoundedError& measured) {
     report.measured = measured.error;
     report.low = measured.low;
     report.high = measured.high;
