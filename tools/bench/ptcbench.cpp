@@ -149,7 +149,7 @@ int main(int argc, char** argv) {
         make_mutations_experiment,    make_relight_experiment, make_remote_experiment,
         make_rooms_experiment,        make_scale_experiment,   make_scan_experiment,
         make_sort_experiment,         make_specks_experiment,  make_stability_experiment,
-        make_truth_experiment,        make_verify_experiment}) {
+        make_surfels_experiment,      make_truth_experiment,   make_verify_experiment}) {
     const Experiment experiment = make();
     CLI::App* const app = command.app().add_subcommand(experiment.name, experiment.purpose);
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));
