@@ -48,6 +48,7 @@ constexpr Known kHows[] = {
     {"eio", How::error, EIO},        // any call fails
     {"enospc", How::error, ENOSPC},  // a call that needs disk space fails
     {"emfile", How::error, EMFILE},  // opening a file fails
+    {"stale", How::error, ENOENT},   // a file is not there, as in a stale listing of a file system
     {"eintr", How::interrupt, EINTR},
     {"short", How::cut, 0},      // half of what was asked for is read or written
     {"none", How::none, 0},      // 0 bytes are written
@@ -57,7 +58,7 @@ constexpr Known kHows[] = {
     {"thread", How::thread, 0},  // a thread cannot be started
 };
 
-enum class Kind { open, create, read, write, sync, close, name, other };
+enum class Kind { open, create, look, read, write, sync, close, name, other };
 
 How how = How::nothing;
 int error_number = 0;
@@ -141,11 +142,12 @@ bool can_happen(Kind kind) {
       return false;
     case How::error:
       if (error_number == EMFILE) return kind == Kind::open || kind == Kind::create;
+      if (error_number == ENOENT) return kind == Kind::open || kind == Kind::look;
       if (error_number == EIO) return true;
       return kind == Kind::create || kind == Kind::write || kind == Kind::sync ||
              kind == Kind::name;
     case How::interrupt:
-      return kind != Kind::name && kind != Kind::other;
+      return kind != Kind::name && kind != Kind::look && kind != Kind::other;
     case How::cut:
       return kind == Kind::read || kind == Kind::write;
     case How::none:
@@ -264,7 +266,7 @@ int sync_watched(const char* call, int fd, Sync real) {
 int look_watched(const char* call, const char* path, struct stat* out) {
   using Look = int(const char*, struct stat*);
   char whole[PATH_MAX];
-  if (strikes(call, Kind::other, watched(path, whole))) return -1;
+  if (strikes(call, Kind::look, watched(path, whole))) return -1;
   return reinterpret_cast<Look*>(::dlsym(RTLD_NEXT, call))(path, out);
 }
 

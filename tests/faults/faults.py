@@ -11,6 +11,7 @@ from collections import Counter
 
 import crashes
 import surroundings
+import tasks
 from harness import CALLS, OLD, Tally, each_scenario
 
 KINDS = {"eio": "Input/output error", "enospc": "No space left on device", "emfile": "Too many open files",
@@ -108,7 +109,7 @@ def fail_threads(place, arguments, tally):
 
 
 PARTS = {"calls": fail_calls, "memory": fail_allocations, "threads": fail_threads, "power": crashes.replay, "kill": crashes.kill,
-         "disk": surroundings.fill, "change": surroundings.disturb}
+         "disk": surroundings.fill, "change": surroundings.disturb, "farm": tasks.fail_tasks}
 PRELOADED = {"calls", "memory", "threads", "power", "change"}
 
 
@@ -125,8 +126,10 @@ def main():
     tally = Tally()
     for part in arguments.parts or PARTS:
         print(f"{part}: {PARTS[part].__doc__.splitlines()[0]}", flush=True)
-        if part in PRELOADED and not CALLS:
+        if (part in PRELOADED or part == "farm") and not CALLS:
             print("  skipped: nothing can be preloaded into a program with a sanitizer")
+        elif part == "farm":
+            tasks.fail_tasks(arguments, tally)
         elif part != "disk" or surroundings.inside_name_space(arguments):
             each_scenario(arguments.scenario, lambda place: PARTS[part](place, arguments, tally))
     tally.end()

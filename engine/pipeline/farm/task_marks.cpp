@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
+#include <system_error>
 #include <vector>
 
 #include "engine/io/file/state_file.h"
@@ -18,24 +20,48 @@ std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
   return plan.folder() / "failed" / task.name();
 }
 
+/// Returns whether a task has written its output; nothing when it is not marked as done.
+std::optional<bool> written(const FarmPlan& plan, const FarmTask& task) {
+  const std::filesystem::path mark = done_mark(plan, task);
+  std::vector<std::byte> bytes;
+  try {
+    bytes = read_state(mark);
+  } catch (const std::system_error& error) {
+    if (error.code() != std::errc::no_such_file_or_directory) throw;
+    return std::nullopt;
+  }
+  StateReader state(bytes, mark.string());
+  if (state.get<std::uint64_t>() != plan.id) return std::nullopt;
+  return state.get<std::uint8_t>() != 0;
+}
+
 }  // namespace
 
-void mark_done(const FarmPlan& plan, const FarmTask& task) {
+void fail_unseen(const FarmPlan& plan, const FarmTask& task, const std::string& needed) {
+  throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again),
+                          plan.file.string() + ": " + task.name() + " needs " + needed +
+                              ", which is not done, or not seen from this machine yet");
+}
+
+void mark_done(const FarmPlan& plan, const FarmTask& task, bool has_output) {
   std::filesystem::create_directories(done_mark(plan, task).parent_path());
   StateWriter state;
   state.put(plan.id);
-  state.put(static_cast<std::uint8_t>(std::filesystem::exists(task.outputs.at(0))));
+  state.put(static_cast<std::uint8_t>(has_output));
   write_shared_state(done_mark(plan, task), state.take());
 }
 
 bool is_done(const FarmPlan& plan, const FarmTask& task) {
-  const std::filesystem::path mark = done_mark(plan, task);
-  if (!std::filesystem::exists(mark)) return false;
-  const std::vector<std::byte> bytes = read_state(mark);
-  StateReader state(bytes, mark.string());
-  if (state.get<std::uint64_t>() != plan.id) return false;
-  if (state.get<std::uint8_t>() == 0 || std::filesystem::exists(task.outputs.at(0))) return true;
+  const std::optional<bool> has_output = written(plan, task);
+  if (!has_output) return false;
+  if (!*has_output || std::filesystem::exists(task.outputs.at(0))) return true;
   return is_spent(plan, task);
+}
+
+bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed) {
+  const std::optional<bool> has_output = written(plan, needed);
+  if (!has_output) fail_unseen(plan, task, needed.name());
+  return *has_output;
 }
 
 bool is_spent(const FarmPlan& plan, const FarmTask& task) {

@@ -23,9 +23,19 @@ void note_failure(const FarmPlan& plan, const FarmTask& task, const std::string&
 void forget_failure(const FarmPlan& plan, const FarmTask& task);
 
 /// Marks a task as done, and whether it has written its output: a part without points has none.
-void mark_done(const FarmPlan& plan, const FarmTask& task);
+void mark_done(const FarmPlan& plan, const FarmTask& task, bool has_output);
 /// Says whether a task is done. One whose output is gone is not, unless it is spent.
 [[nodiscard]] bool is_done(const FarmPlan& plan, const FarmTask& task);
+/// Refuses a task before its time. What other machines have written may come into view late, so
+/// this is worth another try.
+/// @throws std::system_error (EAGAIN)
+/// @param needed  name of the task that must come before it
+[[noreturn]] void fail_unseen(const FarmPlan& plan, const FarmTask& task,
+                              const std::string& needed);
+/// Says whether a task that another one needs has written its output, by its mark: the output may
+/// not be seen from this machine yet.
+/// @throws as fail_unseen() when the mark is not seen
+[[nodiscard]] bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed);
 /// Says whether no task needs the output of a task any more: that of a route when the parts are
 /// done, that of a range when the results are collected.
 [[nodiscard]] bool is_spent(const FarmPlan& plan, const FarmTask& task);

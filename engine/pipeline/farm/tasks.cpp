@@ -166,19 +166,21 @@ class Part {
         progress_(progress),
         attributes_(plan.attributes()) {}
 
-  void run() {
+  /// Builds the part. @return  whether it has points; one without has no file
+  [[nodiscard]] bool run() {
     open_routes();
     const std::uint64_t points = count();
     if (points == 0) {  // a scene has no part without points
       std::filesystem::remove(target_);
       std::filesystem::remove(edges_path(target_));
-      return;
+      return false;
     }
     progress_.begin("sort", points, "points");
     sort(points);
     progress_.begin("build", points, "points");
     build();
     progress_.end();
+    return true;
   }
 
  private:
@@ -310,11 +312,11 @@ void remove_leftovers(const FarmPlan& plan) {
 }
 
 /// Joins the parts that have points.
-void join(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
+void join(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
   std::vector<std::filesystem::path> parts;
-  for (std::size_t i = 0; i < plan.parts(); ++i) {
-    const std::filesystem::path part = plan.output(TaskKind::part, i);
-    if (std::filesystem::exists(part)) parts.push_back(part);
+  for (const FarmTask& part : plan.tasks) {
+    if (part.kind == TaskKind::part && has_output(plan, task, part))
+      parts.push_back(part.outputs.at(0));
   }
   static_cast<void>(join_parts(parts, plan.scene, run, progress));
   remove_leftovers(plan);
@@ -337,34 +339,42 @@ void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
   for (const std::filesystem::path& result : results) std::filesystem::remove(result, gone);
 }
 
-void perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
+/// Does a task. @return  whether it has written its output
+bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
              Progress& progress) {
   std::filesystem::create_directories(plan.folder());
   switch (task.kind) {
     case TaskKind::route:
-      return Route(plan, task, run, progress).run();
+      Route(plan, task, run, progress).run();
+      break;
     case TaskKind::part:
       return Part(plan, task, run, progress).run();
     case TaskKind::join:
-      return join(plan, run, progress);
+      join(plan, task, run, progress);
+      break;
     case TaskKind::shade:
-      return shade_range(shading_of(plan, run), {task.number, plan.shading->ranges}, plan.id,
-                         task.outputs.at(0), progress);
+      shade_range(shading_of(plan, run), {task.number, plan.shading->ranges}, plan.id,
+                  task.outputs.at(0), progress);
+      break;
     case TaskKind::collect:
-      return collect(plan, run, progress);
+      collect(plan, run, progress);
+      break;
   }
+  return true;
 }
 
-/// Refuses a task before its time. What other machines have written may come into view late, so
-/// this is worth another try.
+/// Refuses a task before its time.
 void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
   for (const std::string& name : task.after) {
     const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
-    if (before != plan.tasks.end() && is_done(plan, *before)) continue;
-    throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again),
-                            plan.file.string() + ": " + task.name() + " needs " + name +
-                                ", which is not done, or not seen from this machine yet");
+    if (before == plan.tasks.end() || !is_done(plan, *before)) fail_unseen(plan, task, name);
   }
+}
+
+/// Says whether an error is that of fail_unseen().
+bool is_too_early(const std::exception& error) {
+  const auto* const refused = dynamic_cast<const std::system_error*>(&error);
+  return refused != nullptr && refused->code() == std::errc::resource_unavailable_try_again;
 }
 
 }  // namespace
@@ -376,18 +386,21 @@ void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
 
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {
-  if (is_done(plan, task)) return false;
-  require_forerunners(plan, task);
-  forget_failure(plan, task);
+  bool performed = false;
   try {
-    perform(plan, task, run, progress);
-  } catch (const std::exception& error) {
-    // Another process may have done the task in the meantime, and join removed what this one needed
     if (is_done(plan, task)) return false;
+    require_forerunners(plan, task);
+    forget_failure(plan, task);
+    const bool has_output = perform(plan, task, run, progress);
+    performed = true;
+    mark_done(plan, task, has_output);
+  } catch (const std::exception& error) {
+    if (is_too_early(error)) throw;
+    // Another process may have done the task in the meantime, and join removed what this one needed
+    if (!performed && is_done(plan, task)) return false;
     note_failure(plan, task, error.what());
     throw;
   }
-  mark_done(plan, task);
   if (is_spent(plan, task))  // a second process of it was later than those who need its output
     std::filesystem::remove(task.outputs.at(0));
   return true;
