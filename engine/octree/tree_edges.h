@@ -41,8 +41,7 @@ struct TreeEdges {
   void save(StateWriter& state) const;
   /// Loads edges that save() saved.
   /// @param node_pages  of the container
-  /// @throws DataError when they are no edges of a tree. Wrong edges that it does not see may give
-  /// a
+  /// @throws DataError when they are no edges of a tree. Wrong ones that it does not see may give a
   ///         wrong top over them, but one that pages can hold
   void load(StateReader& state, std::uint32_t node_pages);
 };

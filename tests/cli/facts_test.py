@@ -205,7 +205,7 @@ class Facts(ProgramTest):
         self.assertRegex(summary, r"error: 20 % asked, [\d.]+ % \[[\d.]+, [\d.]+\] measured against the meshes with "
                                   rf"{error['points']} (even|adapted) surfels, {len(error['trials'])} trials")
         self.assertIn("all inputs are meshes", self.fail_with(2, "ptcbuild", self.cloud, "--error", "5%", "-o", few))
-        for other in (["--points", "1k"], ["--spacing", "0.1"], ["--adapt"]):
+        for other in (["--points", "1k"], ["--spacing", "0.1"], ["--adapt"], ["--append", self.scene]):
             self.fail_with(2, "ptcbuild", self.mesh, "--error", "5%", *other, "-o", few)
 
     def test_without_bounces_there_is_occlusion_alone(self):

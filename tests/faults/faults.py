@@ -110,7 +110,7 @@ def fail_threads(place, arguments, tally):
 
 PARTS = {"calls": fail_calls, "memory": fail_allocations, "threads": fail_threads, "power": crashes.replay, "kill": crashes.kill,
          "disk": surroundings.fill, "change": surroundings.disturb, "farm": tasks.fail_tasks}
-PRELOADED = {"calls", "memory", "threads", "power", "change"}
+PRELOADED = {"calls", "memory", "threads", "power", "change", "farm"}
 
 
 def main():
@@ -126,7 +126,7 @@ def main():
     tally = Tally()
     for part in arguments.parts or PARTS:
         print(f"{part}: {PARTS[part].__doc__.splitlines()[0]}", flush=True)
-        if (part in PRELOADED or part == "farm") and not CALLS:
+        if part in PRELOADED and not CALLS:
             print("  skipped: nothing can be preloaded into a program with a sanitizer")
         elif part == "farm":
             tasks.fail_tasks(arguments, tally)

@@ -307,6 +307,7 @@ class Build {
                             progress_);
     if (part_) request_.sampling.spacing = part_->spacing;
     report_.las_records = std::move(inputs.clouds.las_records);
+    report_.streamed = inputs.streamed != nullptr;
     if (inputs.bounds.empty() && !scene_) {
       std::string names;
       for (const auto& input : request_.inputs) names += input.string() + ": ";

@@ -99,7 +99,8 @@ struct BuildReport {
   /// The text `las.vlrs` of the inputs with the records that the container leaves out, too; empty
   /// when they have none, or when the build continues an interrupted one.
   std::string las_records;
-  StageSeconds seconds;  ///< wall time of each stage
+  bool streamed = false;  ///< whether the meshes did not fit in memory
+  StageSeconds seconds;   ///< wall time of each stage
 };
 
 /// Builds a container and publishes it under the name `target`.

@@ -38,9 +38,9 @@ std::optional<bool> written(const FarmPlan& plan, const FarmTask& task) {
 }  // namespace
 
 void fail_unseen(const FarmPlan& plan, const FarmTask& task, const std::string& needed) {
-  throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again),
-                          plan.file.string() + ": " + task.name() + " needs " + needed +
-                              ", which is not done, or not seen from this machine yet");
+  throw NotYet(std::make_error_code(std::errc::resource_unavailable_try_again),
+               plan.file.string() + ": " + task.name() + " needs " + needed +
+                   ", which is not done, or not seen from this machine yet");
 }
 
 void mark_done(const FarmPlan& plan, const FarmTask& task, bool has_output) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <system_error>
 
 #include "engine/pipeline/farm/plan.h"
 
@@ -26,10 +27,15 @@ void forget_failure(const FarmPlan& plan, const FarmTask& task);
 void mark_done(const FarmPlan& plan, const FarmTask& task, bool has_output);
 /// Says whether a task is done. One whose output is gone is not, unless it is spent.
 [[nodiscard]] bool is_done(const FarmPlan& plan, const FarmTask& task);
-/// Refuses a task before its time. What other machines have written may come into view late, so
-/// this is worth another try.
-/// @throws std::system_error (EAGAIN)
+/// Thrown by a task before its time. What other machines have written may come into view late, so
+/// it is worth another try.
+class NotYet : public std::system_error {
+ public:
+  using std::system_error::system_error;
+};
+/// Refuses a task before its time.
 /// @param needed  name of the task that must come before it
+/// @throws NotYet
 [[noreturn]] void fail_unseen(const FarmPlan& plan, const FarmTask& task,
                               const std::string& needed);
 /// Says whether a task that another one needs has written its output, by its mark: the output may

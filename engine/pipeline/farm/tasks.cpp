@@ -371,12 +371,6 @@ void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
   }
 }
 
-/// Says whether an error is that of fail_unseen().
-bool is_too_early(const std::exception& error) {
-  const auto* const refused = dynamic_cast<const std::system_error*>(&error);
-  return refused != nullptr && refused->code() == std::errc::resource_unavailable_try_again;
-}
-
 }  // namespace
 
 void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
@@ -394,8 +388,9 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     const bool has_output = perform(plan, task, run, progress);
     performed = true;
     mark_done(plan, task, has_output);
+  } catch (const NotYet&) {
+    throw;
   } catch (const std::exception& error) {
-    if (is_too_early(error)) throw;
     // Another process may have done the task in the meantime, and join removed what this one needed
     if (!performed && is_done(plan, task)) return false;
     note_failure(plan, task, error.what());

@@ -30,10 +30,9 @@ namespace {
 constexpr std::uint64_t kSeed = std::uint64_t{1} << 52;
 constexpr std::uint64_t kPlaceSeed = 0x5eed;
 
-/// Returns the memory for meshes and the rays at them, while nothing but the sky is in memory.
-MeshLimits limits_of(const RunOptions& run, const Sky& sky, const std::filesystem::path& target) {
-  MemoryBudget budget = budget_of(run.memory_bytes, "comparing surfels with their meshes");
-  charge_sky(budget, sky);
+/// Returns the memory for meshes and the rays at them.
+MeshLimits limits_of(const RunOptions& run, const MemoryBudget& budget,
+                     const std::filesystem::path& target) {
   return {.reading = budget.left(),
           .kept = budget.left(),
           .traced = budget.left(),
@@ -53,6 +52,14 @@ Receiver receiver_of(const RayScene& rays, const SurfaceHit& at, const glm::vec3
 }
 
 }  // namespace
+
+MemoryBudget SurfaceJudge::budget(const ContainerReader& scene, const Sky& sky) const {
+  MemoryBudget all = budget_of(request_.run.memory_bytes, "comparing surfels with their meshes");
+  charge_directory(all, scene);
+  charge_sky(all, sky);
+  if (request_.mesh) charge_mesh(all, *request_.mesh, nullptr);
+  return all;
+}
 
 std::vector<SurfaceJudge::Place> SurfaceJudge::places_on(const RayScene& rays,
                                                          const DirectLight& light) const {
@@ -98,9 +105,12 @@ std::vector<SurfaceJudge::Place> SurfaceJudge::places_seen(const RayScene& rays,
 }
 
 void SurfaceJudge::trace_truth(const RayScene& rays, const DirectLight& light, bool by_emitters) {
-  const LightPaths paths{
-      .sampling = {.sun_rays = 2, .area_rays = by_emitters ? 16U : 0U, .sky_rays = 16},
-      .emission = !by_emitters};
+  // No light that the surfels leave out
+  const LightSampling& asked = request_.sampling.lights;
+  const LightPaths paths{.sampling = {.sun_rays = std::min(2U, asked.sun_rays),
+                                      .area_rays = by_emitters ? 16U : 0U,
+                                      .sky_rays = std::min(16U, asked.sky_rays)},
+                         .emission = !by_emitters};
   truth_.resize(2 * places_.size());
   executor_.for_each(truth_.size(), [&](std::size_t i, unsigned) {
     const SurfaceHit& at = places_[i / 2].at;
@@ -113,17 +123,18 @@ void SurfaceJudge::trace_truth(const RayScene& rays, const DirectLight& light, b
   });
 }
 
-BoundedError SurfaceJudge::measure(const ContainerReader& scene, Progress& progress) {
+BoundedError SurfaceJudge::measure(const ContainerReader& scene) {
   const bool by_emitters = lit_by_emitters(scene);
-  const LightRig lights = recorded_lights(scene, request_.run, target_, progress);
+  Progress silent;
+  const LightRig lights =
+      request_.lights ? *request_.lights : recorded_lights(scene, request_.run, target_, silent);
+  const MemoryBudget left = budget(scene, lights.sky);
   std::vector<Receiver> receivers;
   {
     // Choose the places at the first call, and find how a picture would look at them
-    Progress silent;
-    LoadedMeshes meshes =
-        load_meshes(request_.inputs, request_.mesh.get(),
-                    {request_.backdrop, request_.one_sided, request_.moment},
-                    limits_of(request_.run, lights.sky, target_), began_ ? silent : progress);
+    LoadedMeshes meshes = load_meshes(request_.inputs, request_.mesh.get(),
+                                      {request_.backdrop, request_.one_sided, request_.moment},
+                                      limits_of(request_.run, left, target_), silent);
     require_request(!meshes.parts, "error",
                     "surfels can be compared with their meshes only where these fit in memory");
     require_request(!meshes.mesh.triangles.empty(), "error",
@@ -133,6 +144,10 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene, Progress& progr
       const DirectLight light(rays, lights);
       places_ = request_.sampling.camera ? places_seen(rays, *request_.sampling.camera)
                                          : places_on(rays, light);
+      require_request(places_.size() >= kFewestPlaces, "error",
+                      request_.sampling.camera
+                          ? "the camera sees too little of the meshes to compare surfels with them"
+                          : "too few places of the meshes are lit to compare surfels with them");
       trace_truth(rays, light, by_emitters);
       began_ = true;
     }
@@ -142,22 +157,17 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene, Progress& progr
       receivers.push_back(receiver_of(rays, place.at, place.towards, lift));
   }
   return_freed_memory();
-  if (receivers.empty()) return {};
 
   // Trace the same rays at the surfels
-  MemoryBudget budget = budget_of(request_.run.memory_bytes, "comparing surfels with their meshes");
-  charge_sky(budget, lights.sky);
-  charge_directory(budget, scene);
+  const std::uint64_t least =
+      RayShader::least_bytes(scene, executor_.threads(), RayOptions{}.back_end);
   RayShader discs(scene,
                   {.sky = [&](const glm::vec3& way) { return lights.sky.at(way); },
                    .emission = !by_emitters,
-                   .memory_bytes = budget.rest(
-                       "the page cache",
-                       RayShader::least_bytes(scene, executor_.threads(), RayOptions{}.back_end))},
+                   .memory_bytes = left.rest("the page cache", least)},
                   executor_);
   const std::vector<Receiver> twice = two_of_each(receivers);
   std::vector<Shading> traced(twice.size());
-  Progress silent;
   discs.trace(twice, kRays, kSeed, traced, silent);
   std::vector<ErrorSums> errors(receivers.size());
   for (std::size_t i = 0; i < receivers.size(); ++i)

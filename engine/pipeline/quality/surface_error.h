@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "engine/base/executor.h"
-#include "engine/base/progress.h"
+#include "engine/base/memory_budget.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/quality/error_sums.h"
 #include "engine/scene/ray_scene.h"
@@ -33,7 +33,8 @@ namespace ptc {
 class SurfaceJudge {
  public:
   static constexpr unsigned kPlaces = 2048;  ///< places that are compared, at most
-  static constexpr unsigned kRays = 512;     ///< of each of the two sets of rays of a place
+  static constexpr unsigned kFewestPlaces = 64;
+  static constexpr unsigned kRays = 512;  ///< of each of the two sets of rays of a place
 
   /// @param request   names the meshes, the camera of its sampling and the resources; must outlive
   ///                  this
@@ -42,13 +43,11 @@ class SurfaceJudge {
   SurfaceJudge(const BuildRequest& request, std::filesystem::path target, const Executor& executor)
       : request_(request), target_(std::move(target)), executor_(executor) {}
 
-  /// Returns the errors of a container; zeros where the meshes have no place to be compared at.
-  /// Irradiance is that of light from surfaces, as for shading.
-  /// @param scene     built of the meshes of the request, with the same lights each time
-  /// @param progress  gets notes about the meshes at the first call
-  /// @throws RequestError when the meshes do not fit in memory; LimitError, DataError,
-  ///         std::system_error
-  [[nodiscard]] BoundedError measure(const ContainerReader& scene, Progress& progress);
+  /// Returns the errors of a container. Irradiance is that of light from surfaces, as for shading.
+  /// @param scene  built of the meshes of the request, with the same lights each time
+  /// @throws RequestError when the meshes do not fit in memory, or fewer than kFewestPlaces of
+  ///         theirs are lit or seen; LimitError, DataError, std::system_error
+  [[nodiscard]] BoundedError measure(const ContainerReader& scene);
 
  private:
   /// A place on the mesh that is compared.
@@ -57,6 +56,9 @@ class SurfaceJudge {
     glm::vec3 towards{0};  ///< direction in which it is looked at, unit
   };
 
+  /// Returns a budget with what is in memory all the time: the container's directory, the sky and
+  /// the mesh of the request.
+  [[nodiscard]] MemoryBudget budget(const ContainerReader& scene, const Sky& sky) const;
   /// Returns the sides of the meshes' places that light reaches.
   [[nodiscard]] std::vector<Place> places_on(const RayScene& rays, const DirectLight& light) const;
   /// Returns the places that the camera sees.

@@ -23,9 +23,13 @@ constexpr std::uint64_t kFirst = 16'384, kFewest = 256, kMost = 100'000'000;  //
 constexpr double kGrowth = 1.5, kLeastGrowth = 1.5, kMostGrowth = 4;
 constexpr double kNear = 1.2;     // ratio of numbers between which nothing is tried
 constexpr double kBetter = 0.95;  // of the even error, below which the spacing adapts
-// The error has stopped falling when it is still that share of the one with a fourth of the surfels
-constexpr double kStalled = 0.9, kStalledOver = 4;
+// The error has stopped falling when it is still that share of one with a sixteenth of the surfels
+constexpr double kStalled = 0.8, kStalledOver = 16;
 constexpr double kAsGood = 1.05;  // times the least error
+
+constexpr char kNoRoom[] =
+    "the number of surfels can be chosen only where the meshes fit in memory, beside what their "
+    "sampling takes";
 
 std::uint64_t rounded(double count) {
   return std::clamp(static_cast<std::uint64_t>(std::llround(count)), kFewest, kMost);
@@ -97,7 +101,7 @@ class Search {
     for_each([&](const SurfelTrial& trial) {
       stalled = stalled || (kStalledOver * static_cast<double>(trial.count) <=
                                 static_cast<double>(last.count) &&
-                            last.found.error.relative() > kStalled * trial.found.error.relative());
+                            last.found.high >= kStalled * trial.found.high);
     });
     return stalled;
   }
@@ -105,10 +109,10 @@ class Search {
   /// Returns the trial with the fewest surfels whose error is about the least.
   [[nodiscard]] SurfelTrial as_good_as_best() const {
     double least = std::numeric_limits<double>::infinity();
-    for_each([&](const SurfelTrial& t) { least = std::min(least, t.found.error.relative()); });
+    for_each([&](const SurfelTrial& t) { least = std::min(least, t.found.high); });
     std::optional<SurfelTrial> best;
     for_each([&](const SurfelTrial& t) {
-      if (t.found.error.relative() <= kAsGood * least && (!best || t.count < best->count)) best = t;
+      if (t.found.high <= kAsGood * least && (!best || t.count < best->count)) best = t;
     });
     return *best;
   }
@@ -141,13 +145,15 @@ SurfelTrial SurfelTrials::run(std::uint64_t count, bool adapts) {
   Progress silent;
   const double before = cpu_seconds();
   const auto scene = make_temporary_container(
-      roomiest_temp_dir(request_.run, target_),
-      [&](const std::filesystem::path& path) { build_container(request_, path, silent); });
+      roomiest_temp_dir(request_.run, target_), [&](const std::filesystem::path& path) {
+        // Meshes that stream are spaced evenly and lit by rays at their surfels
+        require_request(!build_container(request_, path, silent).streamed, "error", kNoRoom);
+      });
   trial.cpu_seconds = cpu_seconds() - before;
   return_freed_memory();
   trial.points = scene->superblock().points;
   trial.bytes = scene->superblock().file_bytes;
-  trial.found = judge_.measure(*scene, silent);
+  trial.found = judge_.measure(*scene);
   return trial;
 }
 
@@ -170,12 +176,16 @@ SurfelChoice choose_surfels(const BuildRequest& request, double asked,
     });
   }
   if (!choice.met) {
-    const BoundedError& found = choice.taken.found;
+    const SurfelTrial& taken = choice.taken;
+    std::uint64_t most = 0;
+    for (const SurfelTrial& trial : choice.trials) {
+      if (trial.adapts == taken.adapts) most = std::max(most, trial.points);
+    }
     progress.note(fmt::format(
-        "an error of {:.3g} % is not met: with {} surfels it is {:.3g} % [{:.3g}, {:.3g}], and up "
-        "to {} make it hardly smaller",
-        100 * asked, choice.taken.points, 100 * found.error.relative(), 100 * found.low,
-        100 * found.high, std::ranges::max(choice.trials, {}, &SurfelTrial::points).points));
+        "an error of {:.3g} % is not met: with {} surfels it is {:.3g} % [{:.3g}, {:.3g}]{}",
+        100 * asked, taken.points, 100 * taken.found.error.relative(), 100 * taken.found.low,
+        100 * taken.found.high,
+        most > taken.points ? fmt::format(", and up to {} make it hardly smaller", most) : ""));
   }
   return choice;
 }

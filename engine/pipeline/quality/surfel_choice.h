@@ -48,7 +48,8 @@ class SurfelTrials {
 
   /// Builds a container, which is gone when it has been measured.
   /// @param count, adapts  as in SamplingOptions
-  /// @throws as build_container(); as SurfaceJudge::measure()
+  /// @throws as build_container(); as SurfaceJudge::measure(); RequestError when the meshes do not
+  ///         fit in memory
   [[nodiscard]] SurfelTrial run(std::uint64_t count, bool adapts);
 
  private:
@@ -67,7 +68,7 @@ class SurfelTrials {
     double asked, const std::function<SurfelTrial(std::uint64_t, bool)>& run);
 
 /// Chooses how the meshes of a request are sampled: search_surfels() with SurfelTrials. The choice
-/// depends on the request alone, not on its resources.
+/// depends on the request alone: resources that are too small for it are refused.
 /// @param asked     relative error, above 0 and at most 1
 /// @param seconds   gets a row
 /// @param progress  gets a stage that counts the surfels of the trials, and a note when the error
