@@ -349,6 +349,8 @@ class Build {
     if (request_.mesh) charge_mesh(budget, *request_.mesh, nullptr);
     if (const LitMesh* lit = inputs.lit.get()) {
       charge_mesh(budget, lit->mesh, &lit->rays);
+      // What is too small for any memory is refused as such
+      static_cast<void>(with_spacing(request_.sampling, sampled_area(lit->mesh)));
       const std::uint64_t surfels =
           request_.sampling.spacing > 0 ? points_of(*lit) : request_.sampling.count;
       const std::uint64_t fixed =
