@@ -130,7 +130,7 @@ void declare_sampling(CLI::App& app, Arguments& arguments) {
           ->group(kGroup);
   ptc::add_share(
       app, "--error", arguments.error,
-      "Find about the fewest surfels whose RMS error is at most SHARE, such as 3%\n"
+      "Find about the fewest surfels whose RMS error is at most SHARE\n"
       "SHARE is a percentage or a number up to 1: 3% and 0.03 are the same. The error is "
       "that of occlusion and of light, each relative to its mean, by rays at the surfels "
       "against rays at the meshes along the same directions, at places all over the "
