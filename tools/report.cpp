@@ -298,7 +298,10 @@ std::string choice_text(const SurfelChoice& choice) {
   const BoundedError& found = choice.taken.found;
   return fmt::format(
       "  error: {:.4g} % asked{}, {} measured against the meshes with {} {} surfels, {} trials\n",
-      100 * choice.asked, choice.met ? "" : " and not met",
+      100 * choice.asked,
+      choice.met                              ? ""
+      : found.error.relative() > choice.asked ? " and not met"
+                                              : " and not confirmed",
       bounded_text(found.error.relative(), found.low, found.high), choice.taken.points,
       choice.taken.adapts ? "adapted" : "even", choice.trials.size());
 }

@@ -182,9 +182,9 @@ SurfelChoice choose_surfels(const BuildRequest& request, double asked,
       if (trial.adapts == taken.adapts) most = std::max(most, trial.points);
     }
     progress.note(fmt::format(
-        "an error of {:.3g} % is not met: with {} surfels it is {:.3g} % [{:.3g}, {:.3g}]{}",
-        100 * asked, taken.points, 100 * taken.found.error.relative(), 100 * taken.found.low,
-        100 * taken.found.high,
+        "an error of {:.3g} % is not {}: with {} surfels it is {:.3g} % [{:.3g}, {:.3g}]{}",
+        100 * asked, taken.found.error.relative() > asked ? "met" : "confirmed", taken.points,
+        100 * taken.found.error.relative(), 100 * taken.found.low, 100 * taken.found.high,
         most > taken.points ? fmt::format(", and up to {} make it hardly smaller", most) : ""));
   }
   return choice;
