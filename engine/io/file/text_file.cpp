@@ -4,15 +4,16 @@
 #include <span>
 #include <sstream>
 
-#include "engine/io/file/file.h"
-
 namespace ptc {
 
-std::string read_text(const std::filesystem::path& path) {
-  const InputFile file(path);
+std::string read_text(const InputFile& file) {
   std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(text)));
   return text;
+}
+
+std::string read_text(const std::filesystem::path& path) {
+  return read_text(InputFile(path));
 }
 
 void write_text(const std::filesystem::path& path, const std::string& text) {

@@ -4,9 +4,12 @@
 #include <filesystem>
 #include <string>
 
+#include "engine/io/file/file.h"
+
 namespace ptc {
 
 /// Reads a file. @throws std::system_error
+[[nodiscard]] std::string read_text(const InputFile& file);
 [[nodiscard]] std::string read_text(const std::filesystem::path& path);
 
 /// Writes a file, which appears or is replaced whole (OutputFile). @throws std::system_error

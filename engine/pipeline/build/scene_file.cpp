@@ -19,6 +19,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/io/file/text_file.h"
 #include "engine/io/text/text.h"
 #include "engine/pipeline/build/scene_places.h"
 #include "engine/scene/camera.h"
@@ -53,9 +54,7 @@ class SceneReader {
     if (file.size() * kJsonBytes > memory_bytes_)
       throw LimitError(fmt::format("{}: its JSON may take {} MiB of memory, more than there is",
                                    path_.string(), (file.size() * kJsonBytes >> 20) + 1));
-    std::string text(file.size(), '\0');
-    file.read_at(0, std::as_writable_bytes(std::span(text)));
-    const Json json = parse_json(text, path_.string());
+    const Json json = parse_json(read_text(file), path_.string());
     JsonFields fields(json, path_.string());
     unsigned version = 0;
     fields.read("ptcx_scene", version, {1, 1});
