@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -128,6 +129,10 @@ double surfel_spacing(const ContainerReader& container) {
   return superblock.points == 0
              ? 0
              : std::sqrt(superblock.area / static_cast<double>(superblock.points));
+}
+
+float surfel_radius(const ContainerReader& container) {
+  return static_cast<float>(surfel_spacing(container) / std::numbers::sqrt2);
 }
 
 }  // namespace ptc

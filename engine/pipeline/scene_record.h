@@ -94,5 +94,7 @@ void check_meta(const Meta& meta, std::uint8_t page_shift, std::uint8_t point_by
 /// Returns the distance between neighbouring surfels in scene units: the recorded one or, without a
 /// record, the square root of area over points; 0 for a container without points.
 [[nodiscard]] double surfel_spacing(const ContainerReader& container);
+/// Returns the radius of surfels that lie so far apart, scene units.
+[[nodiscard]] float surfel_radius(const ContainerReader& container);
 
 }  // namespace ptc

@@ -26,7 +26,7 @@
 namespace ptc {
 namespace {
 
-// Of rays at the mesh and at the surfels alike, far from those of runs
+// The seed of the rays at the mesh and of those at the surfels, far from the seeds of runs
 constexpr std::uint64_t kSeed = std::uint64_t{1} << 52;
 constexpr std::uint64_t kPlaceSeed = 0x5eed;
 
@@ -137,10 +137,8 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene) {
                                       limits_of(request_.run, left, target_), silent);
     require_request(!meshes.parts, "error",
                     "surfels can be compared with their meshes only where these fit in memory");
-    require_request(!meshes.mesh.triangles.empty(), "error",
-                    "surfels are compared with their meshes, and there are none");
     const RayScene rays(meshes.mesh);
-    if (!began_) {
+    if (truth_.empty()) {
       const DirectLight light(rays, lights);
       places_ = request_.sampling.camera ? places_seen(rays, *request_.sampling.camera)
                                          : places_on(rays, light);
@@ -149,10 +147,9 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene) {
                           ? "the camera sees too little of the meshes to compare surfels with them"
                           : "too few places of the meshes are lit to compare surfels with them");
       trace_truth(rays, light, by_emitters);
-      began_ = true;
     }
-    const auto radius = static_cast<float>(surfel_spacing(scene) / std::numbers::sqrt2);
-    const float lift = lift_height(radius, LightingRequest{}.lift, scene.header().frame);
+    const float lift =
+        lift_height(surfel_radius(scene), LightingRequest{}.lift, scene.header().frame);
     for (const Place& place : places_)
       receivers.push_back(receiver_of(rays, place.at, place.towards, lift));
   }

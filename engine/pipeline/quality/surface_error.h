@@ -69,9 +69,8 @@ class SurfaceJudge {
   const BuildRequest& request_;
   std::filesystem::path target_;
   const Executor& executor_;
-  bool began_ = false;
   std::vector<Place> places_;
-  std::vector<Shading> truth_;  ///< two for each place, side by side
+  std::vector<Shading> truth_;  ///< two for each place, side by side; empty before the first call
 };
 
 }  // namespace ptc

@@ -285,7 +285,7 @@ void load_subject(Subject& subject, const RenderRequest& request,
 void trace_subject(Subject& subject, const RenderRequest& request, const Lighting& lighting,
                    const LightRig& lights) {
   const ContainerReader& scene = lighting.scene();
-  subject.radius = static_cast<float>(surfel_spacing(scene) / std::numbers::sqrt2);
+  subject.radius = surfel_radius(scene);
   subject.lift = lift_height(subject.radius, request.lift, scene.header().frame);
   subject.rays = std::make_unique<RayScene>(subject.mesh);
   subject.light = std::make_unique<DirectLight>(*subject.rays, lights);

@@ -204,7 +204,7 @@ void BenchScene::add_camera(const SceneOptions& options, const Executor& executo
   } else {
     rays.emplace(lit_.mesh);
     light.emplace(*rays, lit_.lights);
-    const auto radius = static_cast<float>(spacing() / std::numbers::sqrt2);
+    const float radius = surfel_radius(*container_);
     view = view_mesh(*rays, *light, {.sun_rays = 1, .area_rays = 4, .sky_rays = 0}, camera, 1,
                      options.lift * radius);
   }
