@@ -59,7 +59,7 @@ SurfelChoice choose(const BuildRequest& request, double asked, const std::filesy
 
 TEST_CASE("surfel choice: errors of which both sides come from rays leave their noise out",
           "[integration][error]") {
-  // The same noise in what is compared, one error of 0.1 in occlusion and of 0.2 in light
+  // Both sides of each comparison have the same noise. Occlusion is off by 0.1, light by 0.2
   std::vector<ErrorSums> parts(400);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const float a = 0.3F * std::sin(static_cast<float>(i)),

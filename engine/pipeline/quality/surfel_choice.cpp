@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
+#include <ranges>
 #include <utility>
 
 #include <fmt/format.h>
@@ -86,35 +86,26 @@ class Search {
     return rounded(static_cast<double>(bad.count) * std::clamp(growth, kLeastGrowth, kMostGrowth));
   }
 
-  /// Calls body(trial) for the trials with the spacing that was taken.
-  template <class Body>
-  void for_each(const Body& body) const {
-    for (const SurfelTrial& trial : choice_.trials) {
-      if (trial.adapts == adapts_) body(trial);
-    }
-  }
-
   /// Says whether the error is about that of far fewer surfels.
   [[nodiscard]] bool has_stalled() const {
     const SurfelTrial& last = choice_.trials.back();
-    bool stalled = false;
-    for_each([&](const SurfelTrial& trial) {
-      stalled = stalled || (kStalledOver * static_cast<double>(trial.count) <=
-                                static_cast<double>(last.count) &&
-                            last.found.high >= kStalled * trial.found.high);
+    return std::ranges::any_of(choice_.trials, [&](const SurfelTrial& trial) {
+      return trial.adapts == adapts_ &&
+             kStalledOver * static_cast<double>(trial.count) <= static_cast<double>(last.count) &&
+             last.found.high >= kStalled * trial.found.high;
     });
-    return stalled;
   }
 
   /// Returns the trial with the fewest surfels whose error is about the least.
   [[nodiscard]] SurfelTrial as_good_as_best() const {
-    double least = std::numeric_limits<double>::infinity();
-    for_each([&](const SurfelTrial& t) { least = std::min(least, t.found.high); });
-    std::optional<SurfelTrial> best;
-    for_each([&](const SurfelTrial& t) {
-      if (t.found.high <= kAsGood * least && (!best || t.count < best->count)) best = t;
-    });
-    return *best;
+    const auto high = [](const SurfelTrial& trial) { return trial.found.high; };
+    auto same = choice_.trials | std::views::filter([&](const SurfelTrial& trial) {
+                  return trial.adapts == adapts_;
+                });
+    const double most = kAsGood * high(std::ranges::min(same, {}, high));
+    auto as_good =
+        same | std::views::filter([&](const SurfelTrial& trial) { return high(trial) <= most; });
+    return std::ranges::min(as_good, {}, &SurfelTrial::count);
   }
 
   const RunTrial& run_trial_;

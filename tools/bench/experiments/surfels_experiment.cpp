@@ -26,9 +26,6 @@ const char* way_of(bool adapts) {
 
 const Columns<SurfelsRow>& columns() {
   using R = SurfelsRow;
-  const auto of = [](double SurfelTrial::*member) {
-    return [member](const R& r) { return r.trial.*member; };
-  };
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
       {"way", {"surfels are"}, [](const R& r) { return std::string(way_of(r.trial.adapts)); }},
@@ -46,7 +43,7 @@ const Columns<SurfelsRow>& columns() {
       {"high", percent("to %"), [](const R& r) { return r.trial.found.high; }},
       {"e_bias", percent("irradiance bias %", "{:+.2f}"),
        [](const R& r) { return r.trial.found.error.irradiance_bias; }},
-      {"build_cpu", {"build, CPU s", "{:.1f}"}, of(&SurfelTrial::cpu_seconds)}};
+      {"build_cpu", {"build, CPU s", "{:.1f}"}, [](const R& r) { return r.trial.cpu_seconds; }}};
   return columns;
 }
 
