@@ -12,12 +12,10 @@ from collections import Counter
 import crashes
 import surroundings
 import tasks
-from harness import CALLS, OLD, Tally, each_scenario
+from harness import CALLS, HARMLESS, OLD, Tally, each_scenario
 
 KINDS = {"eio": "Input/output error", "enospc": "No space left on device", "emfile": "Too many open files",
          "eintr": "", "short": "", "none": "Input/output error"}
-# Failures of these calls do not affect the result.
-HARMLESS = {"close", "unlink", "fallocate"}
 
 
 def steps(count, most):

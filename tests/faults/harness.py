@@ -20,6 +20,9 @@ BIN = Path(os.environ["PTC_BIN"])
 CALLS = os.environ.get("PTC_CALLS", "")
 OLD = b"what was there before\n" * 1000
 SECONDS = 120  # a run that takes longer hangs
+# Failures of these calls do not affect the result
+HARMLESS = {"close", "unlink", "fallocate"}
+TEMPORARY = re.compile(r"\..+\.tmp-[\w.]+-\d+-[0-9a-f]{8}-\d+(\.ptcx)?")
 
 
 def ball(count):
@@ -94,6 +97,21 @@ class Run:
         self.names = re.findall(r"^call (\S+)$", report, re.M)
 
 
+def environment(home, report, how="", at=0, on=False, trace=None):
+    """Returns the environment of a run with a fault at its calls on files below `home`; `report` tells what it hit."""
+    asked = {"LD_PRELOAD": CALLS, "PTC_FAULTS_DIR": str(home), "PTC_FAULTS_HOW": how, "PTC_FAULTS_AT": str(at),
+             "PTC_FAULTS_REPORT": str(report)}
+    if on:
+        asked["PTC_FAULTS_ON"] = "1"
+    if trace:
+        asked["PTC_FAULTS_TRACE"] = str(trace)
+    return {**os.environ, **asked} if CALLS else dict(os.environ)
+
+
+def text_of(report):
+    return report.read_text(errors="replace") if report.exists() else ""
+
+
 class Place:
     """The directories for the runs of one scenario, one run at a time."""
 
@@ -129,15 +147,6 @@ class Place:
     def files(self):
         return [path for folder in (self.out, *self.temps) for path in folder.iterdir()]
 
-    def environment(self, how="", at=0, on=False, trace=None):
-        asked = {"LD_PRELOAD": CALLS, "PTC_FAULTS_DIR": str(self.home), "PTC_FAULTS_HOW": how,
-                 "PTC_FAULTS_AT": str(at), "PTC_FAULTS_REPORT": str(self.report)}
-        if on:
-            asked["PTC_FAULTS_ON"] = "1"
-        if trace:
-            asked["PTC_FAULTS_TRACE"] = str(trace)
-        return {**os.environ, **asked} if CALLS else dict(os.environ)
-
     @property
     def preloaded(self):
         return bool(CALLS)
@@ -152,7 +161,7 @@ class Place:
         if reset:
             self.reset(old)
         return subprocess.Popen(self.command(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-                                errors="replace", cwd=self.home, env=self.environment(**fault))
+                                errors="replace", cwd=self.home, env=environment(self.home, self.report, **fault))
 
     def run(self, **fault):
         return self.end(self.start(**fault))
@@ -164,8 +173,7 @@ class Place:
             process.kill()
             process.communicate()
             return Run(None, "", "")
-        report = self.report.read_text(errors="replace") if self.report.exists() else ""
-        return Run(process.returncode, errors, report)
+        return Run(process.returncode, errors, text_of(self.report))
 
     def leftovers(self):
         return sorted(path.name for path in self.files() if path != self.target)
@@ -194,11 +202,10 @@ class Place:
                 wrong.append("exit 0 without the new file")
         if run.code > 0 and not re.search(f"^{self.scenario.command[0]}: ", run.errors, re.M):
             wrong.append("no message")
-        names = r"\..+\.tmp-[\w.]+-\d+-[0-9a-f]{8}-\d+(\.ptcx)?"
         keeps = self.scenario.keeps and (run.code != 0 or (may_leave and run.call))
         kept = r"o\.ptcx\.resume(-.+)?" if keeps else "$^"
         left = [name for name in self.leftovers()
-                if not (may_leave and re.fullmatch(names, name)) and not re.fullmatch(kept, name)]
+                if not (may_leave and TEMPORARY.fullmatch(name)) and not re.fullmatch(kept, name)]
         if left:
             wrong.append(f"left behind: {' '.join(left)}")
         return wrong

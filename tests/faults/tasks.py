@@ -5,7 +5,6 @@ plan still comes to the bytes that it comes to without faults.
 """
 
 import json
-import os
 import random
 import re
 import shutil
@@ -14,11 +13,9 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from harness import BIN, CALLS, SECONDS, Run
+from harness import BIN, HARMLESS, SECONDS, TEMPORARY, Run, environment, text_of
 
 HOWS = {"eio": "Input/output error", "enospc": "No space left on device", "kill": "", "stale": ""}
-HARMLESS = {"close", "unlink", "fallocate", "stat"}  # what comes of these is seen in the files
-TEMPORARY = re.compile(r"\..+\.tmp-[\w.]+-\d+-[0-9a-f]{8}-\d+(\.ptcx)?")
 
 
 class Farm:
@@ -46,14 +43,8 @@ class Farm:
         command = [str(BIN / "ptcfarm"), *map(str, words)]
         self.report.unlink(missing_ok=True)
         ended = subprocess.run(command, capture_output=True, text=True, cwd=self.home, timeout=SECONDS,
-                               env=self.environment(**fault))
-        report = self.report.read_text(errors="replace") if self.report.exists() else ""
-        return Run(ended.returncode, ended.stderr, report)
-
-    def environment(self, how="", at=0, on=False):
-        asked = {"LD_PRELOAD": CALLS, "PTC_FAULTS_DIR": str(self.home), "PTC_FAULTS_HOW": how, "PTC_FAULTS_AT": str(at),
-                 "PTC_FAULTS_REPORT": str(self.report)}
-        return {**os.environ, **asked, **({"PTC_FAULTS_ON": "1"} if on else {})} if how else dict(os.environ)
+                               env=environment(self.home, self.report, **fault))
+        return Run(ended.returncode, ended.stderr, text_of(self.report))
 
     def run(self, task, **fault):
         return self.call(*task["command"][1:], **fault)
@@ -78,7 +69,8 @@ class Farm:
             wrong.append("no message")
         if run.code == 3 and (HOWS[how] not in run.errors or str(self.home) not in run.errors):
             wrong.append("the message lacks the error or the file")
-        if run.code == 0 and run.call and run.call not in HARMLESS and how != "stale":
+        # What comes of a look at a file is seen in the outputs
+        if run.code == 0 and run.call and run.call not in HARMLESS | {"stat"} and how != "stale":
             wrong.append("the error is swallowed")
         now = self.files()
         before = {str(path.relative_to(self.states / name)) for path in (self.states / name).rglob("*") if path.is_file()}
