@@ -2,6 +2,7 @@
 // they are wider.
 #include "engine/pipeline/render/splat_holes.h"
 
+#include <limits>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -33,12 +34,13 @@ class Plane {
       for (unsigned x = x0; x < x0 + width; ++x) at(x, y) = seen;
     }
   }
-  std::size_t close() {
+  std::size_t close(float widest = std::numeric_limits<float>::infinity()) {
     return close_holes({.samples = samples_,
                         .width = kSide,
                         .height = kSide,
                         .focal = kFocal,
-                        .scale = SceneScale(Frame{})},
+                        .scale = SceneScale(Frame{}),
+                        .widest = widest},
                        ThreadPool(2));
   }
 
@@ -54,6 +56,16 @@ TEST_CASE("splat holes: a gap between discs is closed by what is around it", "[r
   CHECK(plane.close() == 9);
   CHECK(plane.at(21, 31).depth == Approx(1));
   CHECK(plane.at(21, 31).payload.albedo == std::array<std::uint8_t, 3>{10, 20, 30});
+}
+
+TEST_CASE("splat holes: wide discs close no wider holes than they may", "[render]") {
+  Plane plane;
+  plane.cut(20, 20, 7, 7);  // from its middle to the rim are less than four radii
+  plane.cut(50, 50, 1, 1);
+  CHECK(plane.close(0.5F / kFocal) == 1);
+  CHECK(plane.at(23, 23).empty());
+  CHECK(plane.at(50, 50).depth == Approx(1));
+  CHECK(plane.close() == 49);
 }
 
 TEST_CASE("splat holes: a surface behind does not show through a gap", "[render]") {

@@ -117,7 +117,8 @@ class HoleTest {
   /// Returns the distance within which a sample counts, samples; at least that of the next ones.
   /// @param radii  the same in radii of its disc
   [[nodiscard]] float reach_of(const SplatSample& sample, float radii = kReach) const {
-    return std::max(1.5F, radii * radius_of(sample) * picture_.focal / sample.depth);
+    const float radius = std::min(radius_of(sample), picture_.widest);
+    return std::max(1.5F, radii * radius * picture_.focal / sample.depth);
   }
 
   /// Returns the greatest reach of the samples whose reach may lead into a block.

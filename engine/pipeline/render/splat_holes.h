@@ -40,6 +40,9 @@ struct SplatPicture {
   unsigned width = 0, height = 0;  ///< samples
   float focal = 1;                 ///< distance of the image plane, in samples
   SceneScale scale;
+  /// Greatest radius, edges of the frame, by which a disc closes holes: a wider one closes none
+  /// that is wider.
+  float widest = std::numeric_limits<float>::infinity();
 };
 
 /// The distance within which samples decide about a hole, rows or columns of samples.
@@ -49,14 +52,13 @@ inline constexpr unsigned kHoleReach = 192;
 ///
 /// A sample is in a hole of a surface when it is surrounded by that surface within four radii of
 /// its discs: along at least seven of eight directions of the picture there is a sample in front of
-/// it, no farther away than four times the radius of its disc as the picture shows it. Five
-/// directions are enough where it sees the back of a disc, as past the rim of a closed surface, or
-/// three within one and a half radii. The sample then sees what the nearest of them does, at their
-/// mean nearness. So gaps that are as wide
-/// as the distance between points are closed, and wider ones, which the scan resolves, stay: points
-/// that lie at random leave a fraction of a percent of a surface farther than two radii from the
-/// next.
-/// What becomes of a sample depends on those that are at most kHoleReach rows and columns away.
+/// it, no farther away than four times the radius of its disc as the picture shows it, or four
+/// times `widest` where that is less. Five directions are enough where it sees the back of a disc,
+/// as past the rim of a closed surface, or three within one and a half radii. The sample then sees
+/// what the nearest of them does, at their mean nearness. So gaps that are as wide as the distance
+/// between points are closed, and wider ones, which the scan resolves, stay: points that lie at
+/// random leave a fraction of a percent of a surface farther than two radii from the next. What
+/// becomes of a sample depends on those that are at most kHoleReach rows and columns away.
 /// @return the number of samples that were closed
 std::size_t close_holes(const SplatPicture& picture, const Executor& executor);
 

@@ -135,6 +135,9 @@ SplatView::SplatView(const ContainerReader& scene, const Camera& camera, unsigne
       sky_included_(!sky_is_gathered(scene)) {
   const CameraAxes axes = axes_of(camera);
   axes_ = glm::mat3(glm::vec3(axes.right), -glm::vec3(axes.up), glm::vec3(axes.forward));
+  // Surfels that were sampled on meshes lie evenly, and cover them: what is open between them is
+  // open, but for pinholes. One that stands for several is no sign of wider holes
+  if (scene.meta().text.contains(kSpacingKey)) widest_ = scale_.radius(surfel_radius(scene) / 4);
   focal_ = static_cast<float>(height_) * 0.5F / std::tan(camera.vertical_fov * 0.5F);
 }
 
@@ -150,7 +153,8 @@ void SplatView::finish(const Executor& executor) {
                .width = area_.x1 - area_.x0,
                .height = area_.y1 - area_.y0,
                .focal = focal_,
-               .scale = scale_},
+               .scale = scale_,
+               .widest = widest_},
               executor);
 }
 

@@ -2,6 +2,7 @@
 // (cloud_view.cpp) and what draws surfels of any source (splat_view.cpp) have in common.
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -63,8 +64,9 @@ class SplatView : public PrimaryView {
   unsigned width_, height_;  ///< of the whole picture, samples
   SampleRect area_;          ///< that the depth buffer covers
   float lift_;
-  bool sky_included_;  ///< in the radiance of the surfels
-  float focal_ = 1;    ///< in samples
+  bool sky_included_;                                      ///< in the radiance of the surfels
+  float focal_ = 1;                                        ///< in samples
+  float widest_ = std::numeric_limits<float>::infinity();  ///< as in SplatPicture
   std::vector<SplatSample> samples_;
 };
 
