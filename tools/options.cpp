@@ -335,6 +335,18 @@ CLI::Option* add_share(CLI::App& app, const char* name, std::optional<double>& s
   return app.add_option_function<std::string>(name, set, help)->type_name("SHARE");
 }
 
+CLI::Option* add_tolerance(CLI::App& app, std::optional<double>& tolerance) {
+  return add_share(
+      app, "--tolerance", tolerance,
+      "Store points in fewer bytes, with an RMS error of at most SHARE\n"
+      "SHARE is a percentage or a number up to 1: 3% and 0.03 are the same. Surfels of a cell that "
+      "is flat and evenly lit become one, and what is left is rounded more coarsely. How far this "
+      "goes is tried in temporary containers: the error is that of occlusion and of light at 2,048 "
+      "points, by rays at what is stored against rays at all points, and that of the light that "
+      "points send out. Points with channels, such as the intensity of a scan, are rounded alone. "
+      "ptcinfo --why tells what was chosen.");
+}
+
 void add_error_option(CLI::App& app, std::optional<double>& error) {
   CLI::Option* option = add_share(
       app, "--error", error,

@@ -82,6 +82,9 @@ void apply_preset(const CLI::App& app, Preset preset, LightingRequest& request);
 CLI::Option* add_share(CLI::App& app, const char* name, std::optional<double>& share,
                        const std::string& help);
 
+/// Declares --tolerance SHARE, what a container may be off by for fewer bytes.
+CLI::Option* add_tolerance(CLI::App& app, std::optional<double>& tolerance);
+
 /// Declares --error SHARE, which stands for the settings of the gather that trade time for error
 /// and excludes them. @pre add_gather_options() was called
 void add_error_option(CLI::App& app, std::optional<double>& error);

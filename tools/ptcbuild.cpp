@@ -43,6 +43,8 @@ constexpr char kExamples[] =
     "  ptcbuild sponza.obj --points 20M --sun 30,60,4 --sky 0.5,0.6,0.8 -o sponza.ptcx\n"
     "  # Light a room by a lamp and a spot light\n"
     "  ptcbuild room.glb --point 0,2,0,60W --spot 2,2,0,0,-1,0,40,0.2,300cd -o room.ptcx\n"
+    "  # Store a mesh in as few bytes as an error of 3 % allows\n"
+    "  ptcbuild dragon.ply --tolerance 3% -o small.ptcx\n"
     "  # Build a large cloud on two disks; the same command goes on after an interruption\n"
     "  ptcbuild huge.ply --resume --memory 512M --temp . --temp /scratch -o huge.ptcx\n"
     "  # Build the tiles of a scan, or what another program writes\n"
@@ -64,7 +66,7 @@ struct Arguments {
   ptc::CameraArguments camera;
   bool no_default_lights = false;
   std::string format;  ///< of standard input
-  std::optional<double> error;
+  std::optional<double> error, tolerance;
 };
 
 void declare_scene(ptc::Command& command, Arguments& arguments) {
@@ -167,11 +169,14 @@ void declare_lights(CLI::App& app, Arguments& arguments) {
   ptc::add_light_sampling(app, arguments.request.sampling.lights);
 }
 
-void declare_container(CLI::App& app, ptc::BuildRequest& request) {
+void declare_container(CLI::App& app, Arguments& arguments) {
+  ptc::BuildRequest& request = arguments.request;
   ptc::add_profile(app, request.profile)->group("Container");
+  ptc::add_tolerance(app, arguments.tolerance)->excludes("--append")->group("Container");
   ptc::add_page_size(app, request.page_shift)->group("Container");
   ptc::add_integer(app, "--leaf", request.tree.leaf_points, 1, ptc::kMaxLeafPoints,
                    "Maximum number of points in a leaf of the octree")
+      ->excludes("--tolerance")
       ->group("Container");
   ptc::add_integer(app, "--levels-per-stream", request.tree.levels_per_stream, 1, 63,
                    "Octree levels that share one stream of node pages")
@@ -189,6 +194,7 @@ void declare_resume(CLI::App& app, ptc::BuildRequest& request) {
              "OUTPUT.resume, and in the directories for temporary files. It is removed when the "
              "container is complete. All points go through temporary files. An unfinished sort "
              "starts again.")
+          ->excludes("--tolerance")
           ->group(kGroup);
   ptc::add_count(app, "--checkpoint", request.checkpoint_points,
                  "Maximum number of sorted points to build again, about")
@@ -248,7 +254,16 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
     request.sampling.count = choice->taken.count;
     request.sampling.adapts = choice->taken.adapts;
   }
-  ptc::BuildReport report = ptc::build_container(request, arguments.output, progress);
+  std::optional<ptc::SimplificationChoice> simplified;
+  ptc::BuildReport report;
+  if (arguments.tolerance) {
+    ptc::SimplifiedBuild made =
+        ptc::build_simplified(request, *arguments.tolerance, arguments.output, progress);
+    report = std::move(made.report);
+    simplified = std::move(made.choice);
+  } else {
+    report = ptc::build_container(request, arguments.output, progress);
+  }
   report.seconds.insert(report.seconds.begin(), choosing.begin(), choosing.end());
 
   // Report.
@@ -259,13 +274,15 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   facts["space"] = ptc::facts_of(report.space);
   facts["sort"] = ptc::facts_of(report.sort);
   if (choice) facts["error"] = ptc::facts_of(*choice);
+  if (simplified) facts["tolerance"] = ptc::facts_of(*simplified);
   facts["seconds"] = ptc::facts_of(report.seconds);
-  return {
-      facts,
-      fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}{}",
-                  arguments.output.string(), made.points, made.nodes, made.levels, made.page_count,
-                  ptc::bytes_text(made.file_bytes), ptc::total_seconds(report.seconds),
-                  choice ? ptc::choice_text(*choice) : "", ptc::stages_text(report.seconds))};
+  return {facts,
+          fmt::format("{}: {} points, {} nodes on {} levels, {} pages, {}, {:.2f} s\n{}{}{}",
+                      arguments.output.string(), made.points, made.nodes, made.levels,
+                      made.page_count, ptc::bytes_text(made.file_bytes),
+                      ptc::total_seconds(report.seconds), choice ? ptc::choice_text(*choice) : "",
+                      simplified ? ptc::choice_text(*simplified) : "",
+                      ptc::stages_text(report.seconds))};
 }
 
 }  // namespace
@@ -277,7 +294,7 @@ int main(int argc, char** argv) {
   ptc::add_selection(command.app(), arguments.request.selection);
   declare_sampling(command.app(), arguments);
   declare_lights(command.app(), arguments);
-  declare_container(command.app(), arguments.request);
+  declare_container(command.app(), arguments);
   declare_camera(command.app(), arguments);
   declare_resume(command.app(), arguments.request);
   return command.run(argc, argv,

@@ -13,6 +13,7 @@
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/convert/point_files.h"
+#include "engine/pipeline/quality/simplification_choice.h"
 #include "engine/pipeline/run.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
@@ -44,7 +45,9 @@ constexpr char kExamples[] =
     "  # Make a container of a cloud that is larger than memory\n"
     "  ptcconvert scan.xyz scan.ptcx --memory 512M --temp /scratch\n"
     "  # Store a container in fewer bytes\n"
-    "  ptcconvert scene.ptcx small.ptcx --profile compact --page-size 16K\n";
+    "  ptcconvert scene.ptcx small.ptcx --profile compact --page-size 16K\n"
+    "  # Store it in as few bytes as an error of 3 % allows\n"
+    "  ptcconvert scene.ptcx smaller.ptcx --tolerance 3%\n";
 
 /// What the command line says.
 struct Arguments {
@@ -57,11 +60,17 @@ struct Arguments {
   bool dry_run = false;
   std::string format;  ///< of standard input
   ptc::SamplingOptions sampling;
+  std::optional<double> tolerance;
+};
+
+/// A conversion, and what it simplified.
+struct Converted {
+  ptc::ConvertReport report;
+  std::optional<ptc::SimplificationChoice> choice;
 };
 
 /// Builds a container from a cloud or a mesh.
-ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
-                         ptc::Progress& progress) {
+Converted build(const Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   ptc::BuildRequest request;
   request.inputs = {arguments.input};
   request.original_order = arguments.points.original_order;
@@ -70,10 +79,37 @@ ptc::ConvertReport build(const Arguments& arguments, const ptc::RunOptions& run,
   request.profile = arguments.profile;
   request.page_shift = arguments.page_shift;
   request.run = run;
-  ptc::BuildReport built = ptc::build_container(request, arguments.output, progress);
-  return {.points = built.superblock.points,
-          .superblock = built.superblock,
-          .seconds = std::move(built.seconds)};
+  ptc::BuildReport built;
+  std::optional<ptc::SimplificationChoice> choice;
+  if (arguments.tolerance) {
+    ptc::SimplifiedBuild made =
+        ptc::build_simplified(request, *arguments.tolerance, arguments.output, progress);
+    built = std::move(made.report);
+    choice = std::move(made.choice);
+  } else {
+    built = ptc::build_container(request, arguments.output, progress);
+  }
+  return {{.points = built.superblock.points,
+           .superblock = built.superblock,
+           .seconds = std::move(built.seconds)},
+          std::move(choice)};
+}
+
+/// Writes a container as a container, and simplifies it when that is asked for.
+Converted recode(const Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
+  const ptc::ContainerReader container(arguments.input);
+  ptc::RecodeOptions options{.profile = arguments.profile, .run = run};
+  if (arguments.page_size_given) options.page_shift = arguments.page_shift;
+  Converted made;
+  ptc::StageSeconds choosing;
+  if (arguments.tolerance) {
+    made.choice = ptc::choose_simplification(container, *arguments.tolerance, options,
+                                             arguments.output, choosing, progress);
+    options = ptc::simplified(options, *made.choice);
+  }
+  made.report = ptc::recode_container(container, arguments.output, options, progress);
+  made.report.seconds.insert(made.report.seconds.begin(), choosing.begin(), choosing.end());
+  return made;
 }
 
 /// Notes options that the kinds of the input and of the output leave without effect.
@@ -82,7 +118,8 @@ void note_unused_options(const Arguments& arguments, const CLI::App& app, ptc::P
   if (is_container || ptc::is_point_file(arguments.input))
     ptc::note_unused(app, {"--points"}, "the input is no mesh", progress);
   if (!ptc::has_ending(arguments.output, ".ptcx"))
-    ptc::note_unused(app, {"--profile", "--page-size"}, "the output is no container", progress);
+    ptc::note_unused(app, {"--profile", "--page-size", "--tolerance"}, "the output is no container",
+                     progress);
   if (ptc::has_ending(arguments.output, ".ptcx"))
     ptc::note_unused(app, {"--colour-from"}, "the output is a container", progress);
 }
@@ -141,25 +178,20 @@ ptc::Outcome tell_losses(Arguments arguments, ptc::Progress& progress) {
 }
 
 /// Chooses the conversion by the contents of the input and the ending of the output.
-ptc::ConvertReport convert(const Arguments& arguments, const ptc::RunOptions& run,
-                           ptc::Progress& progress) {
+Converted convert(const Arguments& arguments, const ptc::RunOptions& run, ptc::Progress& progress) {
   const bool to_container = ptc::has_ending(arguments.output, ".ptcx");
   if (!ptc::is_container(arguments.input)) {
     if (to_container) return build(arguments, run, progress);
     if (ptc::is_point_file(arguments.input))
-      return ptc::cloud_to_points(arguments.input, arguments.output, arguments.points, progress);
+      return {ptc::cloud_to_points(arguments.input, arguments.output, arguments.points, progress)};
     refuse_mesh(arguments);
   }
   const ptc::Selection& selection = arguments.points.selection;
   if (to_container && !(selection.takes_all() && !selection.channels))
     return build(arguments, run, progress);
-  const ptc::ContainerReader container(arguments.input);
-  if (to_container) {
-    ptc::RecodeOptions options{.profile = arguments.profile, .run = run};
-    if (arguments.page_size_given) options.page_shift = arguments.page_shift;
-    return ptc::recode_container(container, arguments.output, options, progress);
-  }
-  return ptc::container_to_points(container, arguments.output, arguments.points, progress);
+  if (to_container) return recode(arguments, run, progress);
+  return {ptc::container_to_points(ptc::ContainerReader(arguments.input), arguments.output,
+                                   arguments.points, progress)};
 }
 
 }  // namespace
@@ -193,7 +225,9 @@ int main(int argc, char** argv) {
   ptc::add_selection(app, arguments.points.selection);
   ptc::add_level(app, arguments.points.selection);
   ptc::add_points(command.app(), arguments.sampling.count);
-  ptc::add_profile(command.app(), arguments.profile)->group("Container");
+  const CLI::Option* profile =
+      ptc::add_profile(command.app(), arguments.profile)->group("Container");
+  ptc::add_tolerance(command.app(), arguments.tolerance)->group("Container");
   const CLI::Option* page_size =
       ptc::add_page_size(command.app(), arguments.page_shift)->group("Container");
   return command.run(argc, argv, [&](ptc::Progress& progress) -> ptc::Outcome {
@@ -205,18 +239,21 @@ int main(int argc, char** argv) {
     arguments.input = inputs.paths().front();
     arguments.points.run = command.run_options();
     arguments.page_size_given = page_size->count() > 0;
+    if (arguments.tolerance && profile->count() == 0) arguments.profile = ptc::Profile::compact;
     if (arguments.dry_run) return tell_losses(arguments, progress);
     note_unused_options(arguments, command.app(), progress);
-    const ptc::ConvertReport report = convert(arguments, command.run_options(), progress);
+    const auto [report, choice] = convert(arguments, command.run_options(), progress);
     if (report.points == 0 && !arguments.points.selection.takes_all())
       progress.note("the selection takes no point");
     const std::uint64_t bytes = std::filesystem::file_size(arguments.output);
     nlohmann::ordered_json facts{{"output", arguments.output.string()}, {"points", report.points}};
     if (report.superblock) facts.update(ptc::container_facts(*report.superblock));
     facts["bytes"]["file"] = bytes;
+    if (choice) facts["tolerance"] = ptc::facts_of(*choice);
     facts["seconds"] = ptc::facts_of(report.seconds);
     return {facts,
-            fmt::format("{}: {} points, {}, {:.2f} s\n", arguments.output.string(), report.points,
-                        ptc::bytes_text(bytes), ptc::total_seconds(report.seconds))};
+            fmt::format("{}: {} points, {}, {:.2f} s\n{}", arguments.output.string(), report.points,
+                        ptc::bytes_text(bytes), ptc::total_seconds(report.seconds),
+                        choice ? ptc::choice_text(*choice) : "")};
   });
 }

@@ -32,15 +32,18 @@
 #include "format/point_page.h"
 #include "tools/common.h"
 #include "tools/inputs.h"
+#include "tools/option_text.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/why.h"
 
 namespace {
 
 using nlohmann::ordered_json;
 
 constexpr char kPurpose[] =
-    "Prints what a container or a cloud holds, without reading its points and nodes.\n"
+    "Prints what a container or a cloud holds. Its points and nodes are not read, but for --why "
+    "and --thumbnail.\n"
     "The summary has the numbers of points, nodes and pages, the bounds in scene units, the bytes, "
     "the channels, and the inputs and lights of the build. --json has these in full, with the "
     "camera and all settings. Of a cloud the summary has what its header states: the format, the "
@@ -51,6 +54,8 @@ constexpr char kExamples[] =
     "  ptcinfo scene.ptcx\n"
     "  # Look at a scan before it is built\n"
     "  ptcinfo scan.laz\n"
+    "  # Tell what a point takes, and why\n"
+    "  ptcinfo scene.ptcx --why\n"
     "  # Draw a small picture of a container\n"
     "  ptcinfo scene.ptcx --thumbnail scene.png\n"
     "  # Read one figure in a script\n"
@@ -418,18 +423,29 @@ int main(int argc, char** argv) {
                   "It takes a moment for a scene of any size: of more than two million points "
                   "the coarse levels of the octree alone are drawn.")
       ->required(false);
+  bool why = false;
+  command.app()
+      .add_flag(
+          "--why", why,
+          "Tell what is stored of a point, in how many bytes, and why\n"
+          "The bytes are measured on up to 64 pages of points, a column at a time. They add up "
+          "to somewhat more or less than the pages take, whose columns are compressed "
+          "together.")
+      ->group(ptc::kFilesGroup);
   return command.run(argc, argv, [&](ptc::Progress&) -> ptc::Outcome {
     if (!ptc::is_container(file) && ptc::is_build_input(file)) {
       if (!ptc::is_point_file(file)) refuse(file, "this is a mesh");
+      if (why) refuse(file, "--why is about what containers store, and this is a cloud");
       if (!thumbnail.empty())
         refuse(file, "--thumbnail draws containers alone, and this is a cloud");
       return tell_cloud(file);
     }
     require_memory(file, command.run_options());
     const ptc::ContainerReader container(file);
-    const ordered_json facts = facts_of(container);
+    ordered_json facts = facts_of(container);
+    if (why) facts["why"] = ptc::why_facts(container);
     if (!thumbnail.empty())
       ptc::write_thumbnail(container, thumbnail, ptc::ThreadPool(command.run_options().threads));
-    return {facts, summary_of(facts)};
+    return {facts, summary_of(facts) + (why ? ptc::why_text(facts["why"]) : "")};
   });
 }

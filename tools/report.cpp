@@ -306,6 +306,36 @@ std::string choice_text(const SurfelChoice& choice) {
       choice.taken.adapts ? "adapted" : "even", choice.trials.size());
 }
 
+ordered_json facts_of(const SimplificationChoice& choice) {
+  const auto facts_of_trial = [](const SimplificationTrial& trial) {
+    return ordered_json{{"merging", trial.merging},
+                        {"rounding", trial.rounding},
+                        {"points", trial.points},
+                        {"bytes", trial.bytes},
+                        {"error", trial.found.error.relative()},
+                        {"low", trial.found.low},
+                        {"high", trial.found.high},
+                        {"light_error", trial.light_error},
+                        {"albedo_error", trial.albedo_error}};
+  };
+  ordered_json facts{{"asked", choice.asked}, {"met", choice.met}};
+  facts.update(facts_of_trial(choice.taken));
+  facts["trials"] = ordered_json::array();
+  for (const SimplificationTrial& trial : choice.trials)
+    facts["trials"].push_back(facts_of_trial(trial));
+  return facts;
+}
+
+std::string choice_text(const SimplificationChoice& choice) {
+  const SimplificationTrial& taken = choice.taken;
+  return fmt::format(
+      "  tolerance: {:.4g} % asked{}, light that arrives {} off, light that leaves {:.2f} %, "
+      "{} trials\n",
+      100 * choice.asked, choice.met ? "" : " and not met",
+      bounded_text(taken.found.error.relative(), taken.found.low, taken.found.high),
+      100 * taken.light_error, choice.trials.size());
+}
+
 std::string light_text(const std::string& output, const LightReport& report) {
   std::string text =
       fmt::format("{}: {} points, {} shadow rays, {:.2f} s\n{}", output, report.points, report.rays,

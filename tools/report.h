@@ -32,9 +32,13 @@ namespace ptc {
 [[nodiscard]] nlohmann::ordered_json facts_of(const LightReport& report);
 /// The number of surfels that was chosen, its error, and all trials.
 [[nodiscard]] nlohmann::ordered_json facts_of(const SurfelChoice& choice);
+/// What a simplification leaves, its errors, and all trials.
+[[nodiscard]] nlohmann::ordered_json facts_of(const SimplificationChoice& choice);
 
 /// The line about a number of surfels that was chosen.
 [[nodiscard]] std::string choice_text(const SurfelChoice& choice);
+/// The lines about a simplification that was chosen.
+[[nodiscard]] std::string choice_text(const SimplificationChoice& choice);
 /// The summary of a lighting: "lit.ptcx: 1000 points, 4000 shadow rays, 1.20 s", the stages, and a
 /// line on what emits light.
 [[nodiscard]] std::string light_text(const std::string& output, const LightReport& report);

@@ -9,33 +9,46 @@
 #include <cstdlib>
 #include <vector>
 
+#include <fmt/format.h>
+
 namespace ptc {
 namespace {
 
-/// Rounds a radius to 8 bits behind the leading one.
-float rounded_radius(float radius) noexcept {
-  const std::uint32_t bits = (std::bit_cast<std::uint32_t>(radius + 0.0F) + 0x4000) & ~0x7fffU;
-  return std::bit_cast<float>(std::min(bits, 0x7f7f8000U));  // the greatest finite value
+/// Rounds a radius to some bits behind the leading one.
+float rounded_radius(float radius, int bits) noexcept {
+  const std::uint32_t step = 1U << (23 - bits);
+  const std::uint32_t pattern =
+      (std::bit_cast<std::uint32_t>(radius + 0.0F) + step / 2) & ~(step - 1);
+  return std::bit_cast<float>(std::min(pattern, 0x7f800000U - step));  // the greatest finite value
 }
 
-/// Rounds a component of a normal to a multiple of 32. The ends of the range, 32767 and -32767,
-/// stay, because the axes lie on them.
-std::int16_t rounded_normal(std::int16_t component) noexcept {
-  const int size = std::min((std::abs(int{component}) + 16) / 32 * 32, 32767);
+/// Rounds a component of a normal to a multiple of a power of two. The ends of the range, 32767 and
+/// -32767, stay, because the axes lie on them.
+std::int16_t rounded_normal(std::int16_t component, int bits) noexcept {
+  const int step = 1 << (15 - bits);
+  const int size = std::min((std::abs(int{component}) + step / 2) / step * step, 32767);
   return static_cast<std::int16_t>(component < 0 ? -size : size);
 }
 
-/// Rounds a half to 7 bits behind the leading one.
-std::uint16_t rounded_radiance(std::uint16_t half) noexcept {
+/// Rounds a half to some bits behind the leading one.
+std::uint16_t rounded_radiance(std::uint16_t half, int bits) noexcept {
   if (half == 0x8000) return 0;  // -0
-  return static_cast<std::uint16_t>(std::min((half + 4) & ~7, 0x7bf8));
+  const int step = 1 << (10 - bits);
+  return static_cast<std::uint16_t>(std::min((half + step / 2) & ~(step - 1), 0x7c00 - step));
+}
+
+/// Rounds a channel of albedo to a multiple of a power of two; 255 stays.
+std::uint8_t rounded_albedo(std::uint8_t channel, int bits) noexcept {
+  const int step = 1 << (8 - bits);
+  return static_cast<std::uint8_t>(std::min((channel + step / 2) & ~(step - 1), 255));
 }
 
 /// The stream that round_points() returns.
 class RoundedStream : public PointStream {
  public:
-  RoundedStream(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before)
-      : sorted_(sorted), unit_(unit), executor_(executor), last_(before) {}
+  RoundedStream(PointStream& sorted, double unit, const Executor& executor, const MortonKey& before,
+                const PointRounding& rounding)
+      : sorted_(sorted), unit_(unit), executor_(executor), rounding_(rounding), last_(before) {}
 
   std::size_t next(std::span<PointRecord> out) override {
     // Round all pieces, each as if it were the first.
@@ -68,19 +81,24 @@ class RoundedStream : public PointStream {
 
   /// Rounds a point. @param before  position of the rounded point before it
   void round(PointRecord& point, const MortonKey& before) const noexcept {
-    point.radius = rounded_radius(point.radius);
-    for (std::int16_t& component : point.normal) component = rounded_normal(component);
-    for (std::uint16_t& half : point.radiance) half = rounded_radiance(half);
-    for (std::uint16_t& half : point.emission) half = rounded_radiance(half);
+    point.radius = rounded_radius(point.radius, rounding_.radius_bits);
+    for (std::int16_t& component : point.normal)
+      component = rounded_normal(component, rounding_.normal_bits);
+    for (std::uint16_t& half : point.radiance)
+      half = rounded_radiance(half, rounding_.radiance_bits);
+    for (std::uint16_t& half : point.emission)
+      half = rounded_radiance(half, rounding_.radiance_bits);
+    for (std::uint8_t& channel : point.albedo)
+      channel = rounded_albedo(channel, rounding_.albedo_bits);
     point.key = rounded_key(point.key, point.radius, before);
   }
 
   /// Returns the low corner of the largest cell around the point whose diagonal is at most
-  /// kRoundedPosition radii. If that corner precedes the previous point on the curve, a smaller
-  /// cell is taken, in the end the point itself.
+  /// PointRounding::position radii. If that corner precedes the previous point on the curve, a
+  /// smaller cell is taken, in the end the point itself.
   [[nodiscard]] MortonKey rounded_key(const MortonKey& key, float radius,
                                       const MortonKey& before) const noexcept {
-    const double edge = static_cast<double>(radius) / unit_ * (kRoundedPosition / std::sqrt(3.0));
+    const double edge = static_cast<double>(radius) / unit_ * (rounding_.position / std::sqrt(3.0));
     const int exponent = static_cast<int>(std::bit_cast<std::uint64_t>(edge) >> 52) - 1023;
     int level = edge >= 1 ? std::max(kLatticeBits - exponent, 0) : kLatticeBits;
     while (cell_of(key, level) < before) ++level;
@@ -90,6 +108,7 @@ class RoundedStream : public PointStream {
   PointStream& sorted_;
   double unit_;
   const Executor& executor_;
+  PointRounding rounding_;
   std::vector<MortonKey> exact_;  ///< the keys of the points being rounded, before rounding
   MortonKey last_;                ///< the rounded key of the last point handed out
 };
@@ -106,8 +125,21 @@ bool is_rounded(Profile profile) noexcept {
 }
 
 std::unique_ptr<PointStream> round_points(PointStream& sorted, double unit,
-                                          const Executor& executor, const MortonKey& before) {
-  return std::make_unique<RoundedStream>(sorted, unit, executor, before);
+                                          const Executor& executor, const MortonKey& before,
+                                          const PointRounding& rounding) {
+  return std::make_unique<RoundedStream>(sorted, unit, executor, before, rounding);
+}
+
+std::string rounding_text(const PointRounding& rounding) {
+  // A step along u and v of an octahedral normal turns it by at most 1.57 and sqrt(2) steps [rad]
+  const double turn =
+      kRoundedNormal * std::exp2(PointRounding{}.normal_bits - rounding.normal_bits);
+  std::string text =
+      fmt::format("position {:.2g} radius, radius 1/{}, normal {:.2g}, radiance 1/{}",
+                  rounding.position, 2 << rounding.radius_bits, turn, 2 << rounding.radiance_bits);
+  if (rounding.albedo_bits < 8)
+    text += fmt::format(", albedo {}/255", 1 << (7 - rounding.albedo_bits));
+  return text;
 }
 
 }  // namespace ptc

@@ -57,6 +57,37 @@ class Facts(ProgramTest):
         for vector in VECTORS.glob("good/*.ptcx"):
             self.assertIn("\n  bounds    ", self.succeed("ptcinfo", vector, "--memory", "1G").stdout)
 
+    def test_a_tolerance_saves_bytes_and_is_explained(self):
+        usual, small, again = (self.here / name for name in ("u.ptcx", "s.ptcx", "t.ptcx"))
+        self.succeed("ptcbuild", self.mesh, "--points", "100k", "--no-default-lights", "-o", usual)
+        told = json.loads(self.succeed("ptcbuild", self.mesh, "--points", "100k", "--no-default-lights",
+                                       "--tolerance", "3%", "-o", small, "--json").stdout)
+        self.assertTrue(told["tolerance"]["met"])
+        self.assertEqual(told["tolerance"]["asked"], 0.03)
+        self.assertLessEqual(told["tolerance"]["high"], 0.03)
+        self.assertEqual(told["points"], told["tolerance"]["points"])
+        self.assertLess(small.stat().st_size, usual.stat().st_size / 2)
+        self.succeed("ptcverify", small)
+        why = self.succeed("ptcinfo", small, "--why").stdout
+        self.assertIn("\n  why       a tolerance of 3 % was asked for: what arrives at points is ", why)
+        self.assertRegex(why, r"\n  merged    \d+ of \d+ points lie in cells that are flat and evenly lit, and \d+ surfels stand for them\n")
+        self.assertRegex(why, r"\n  position  \d\.\d\d bytes a point\n")
+        self.assertIn("\n  leaves    of at most 32 points: ", why)
+        self.assertIn("\n  why       no tolerance was asked for, so every point is stored\n", self.succeed("ptcinfo", usual, "--why").stdout)
+        facts = json.loads(self.succeed("ptcinfo", usual, "--why", "--json").stdout)["why"]
+        bytes_of_all = facts["bytes_per_point"]
+        self.assertEqual(set(bytes_of_all), {"position", "radius", "normal", "radiance", "albedo", "flags"})
+        self.assertNotIn("simplified", facts)
+        # The same container, by another way: ptcconvert takes the profile that a tolerance needs
+        self.succeed("ptcbuild", self.mesh, "--points", "100k", "--no-default-lights", "--profile", "exact", "-o", usual)
+        self.succeed("ptcconvert", usual, again, "--tolerance", "3%")
+        self.assertEqual(json.loads(self.succeed("ptcinfo", again, "--json").stdout)["points"], told["points"])
+        for code, arguments, complaint in ((2, ("ptcconvert", usual, again, "--tolerance", "3%", "--profile", "exact"), "fast or compact"),
+                                           (2, ("ptcbuild", self.mesh, "-o", again, "--tolerance", "0"), "above 0 and at most 1"),
+                                           (2, ("ptcbuild", self.mesh, "-o", again, "--tolerance", "3%", "--resume"), "--tolerance"),
+                                           (1, ("ptcinfo", self.cloud, "--why"), "is about what containers store")):
+            self.assertIn(complaint, self.fail_with(code, *arguments))
+
     def test_lights_take_the_group_that_was_named_before_them(self):
         scene = self.here / "o.ptcx"
         self.succeed("ptclight", self.scene, "--point", "0,3,0,1", "--light-group", "a", "--sun", "30,60", "--point", "0,4,0,1",

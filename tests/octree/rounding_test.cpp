@@ -18,10 +18,11 @@ using namespace ptc::test;
 namespace {
 
 std::vector<PointRecord> rounded(const std::vector<PointRecord>& records, const Frame& frame,
-                                 std::size_t block = 777) {
+                                 std::size_t block = 777, const PointRounding& rounding = {}) {
   VectorStream stream(records, block);
   const ThreadPool executor(2);
-  const std::unique_ptr<PointStream> from = round_points(stream, frame.unit(), executor);
+  const std::unique_ptr<PointStream> from =
+      round_points(stream, frame.unit(), executor, {}, rounding);
   std::vector<PointRecord> out(records.size()), part(block);
   std::size_t at = 0;
   while (const std::size_t count = from->next(part)) {
@@ -128,4 +129,46 @@ TEST_CASE("rounding: axes, range ends and points without radius stay as they are
   CHECK(out[2].radiance == std::array<std::uint16_t, 3>{0x7bf8, 0, 0});
   CHECK(std::isfinite(out[3].radius));
   CHECK(out[4].radius == 0);
+}
+
+TEST_CASE("rounding: fewer bits make the errors that their text tells", "[build][rounding]") {
+  CHECK(rounding_text({}) == kRounding);
+  constexpr PointRounding kCoarse{
+      .position = 0.02, .radius_bits = 5, .normal_bits = 6, .radiance_bits = 4, .albedo_bits = 5};
+  CHECK(rounding_text(kCoarse) ==
+        "position 0.02 radius, radius 1/64, normal 0.034, radiance 1/32, albedo 4/255");
+  SortedScene scene = sort_scene(heaps());
+  for (std::size_t i = 0; i < scene.records.size(); ++i)
+    scene.records[i].albedo = {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(i / 256),
+                               255};
+  const std::vector<PointRecord> records = rounded(scene.records, scene.frame, 777, kCoarse);
+  CHECK(std::ranges::is_sorted(records, {}, &PointRecord::key));
+  double position = 0, radius = 0, normal = 0, radiance = 0;
+  int albedo = 0;
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const Surfel was = to_surfel(scene.records[i], scene.frame),
+                 is = to_surfel(records[i], scene.frame);
+    position = std::max(position, glm::distance(was.position, is.position) / double{is.radius});
+    radius = std::max(radius, std::abs(double{is.radius} / double{was.radius} - 1));
+    const glm::dvec3 a(was.normal), b(is.normal);
+    normal = std::max(normal, std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)));
+    if (was.radiance.x > 1e-3F)
+      radiance = std::max(radiance, std::abs(double{is.radiance.x} / double{was.radiance.x} - 1));
+    for (std::size_t c = 0; c < 3; ++c)
+      albedo = std::max(albedo, std::abs(records[i].albedo[c] - scene.records[i].albedo[c]));
+    REQUIRE(records[i].albedo[2] == 255);
+  }
+  CHECK(position <= 0.02);
+  CHECK(position > 0.01);
+  CHECK(radius <= 1.0 / 64);
+  CHECK(radius > 0.5 / 64);
+  CHECK(normal <= 0.034);
+  CHECK(normal > 0.017);
+  CHECK(radiance <= 1.0 / 32);
+  CHECK(radiance > 0.5 / 32);
+  CHECK(albedo == 4);
+  // Rounded once more, nothing changes
+  const std::vector<PointRecord> again = rounded(records, scene.frame, 777, kCoarse);
+  CHECK(std::ranges::equal(again, records, {}, &PointRecord::key, &PointRecord::key));
+  CHECK(std::ranges::equal(again, records, {}, &PointRecord::albedo, &PointRecord::albedo));
 }

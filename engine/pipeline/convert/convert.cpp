@@ -5,16 +5,18 @@
 #include "engine/pipeline/convert/convert.h"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include "engine/io/file/file.h"
 #include "engine/io/text/text.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
+#include "engine/octree/flat_cells.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
+#include "engine/pipeline/convert/rim_rays.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/store/commit.h"
 #include "engine/store/container_points.h"
@@ -26,11 +28,13 @@ namespace {
 
 /// Returns the UUID of the copy. It is another one than that of the original, whose pages must not
 /// pass for pages of the copy.
-Uuid derived_uuid(const ContainerReader& container, Profile profile, std::uint8_t page_shift) {
-  std::array<std::byte, sizeof(Uuid) + 2> text;
-  std::ranges::copy(container.header().uuid, text.begin());
-  text[sizeof(Uuid)] = static_cast<std::byte>(profile);
-  text[sizeof(Uuid) + 1] = static_cast<std::byte>(page_shift);
+Uuid derived_uuid(const ContainerReader& container, const RecodeOptions& options,
+                  std::uint8_t page_shift) {
+  std::vector<std::byte> text(sizeof(Uuid) + 2 + options.simplified.size());
+  const auto rest = std::ranges::copy(container.header().uuid, text.begin()).out;
+  rest[0] = static_cast<std::byte>(options.profile);
+  rest[1] = static_cast<std::byte>(page_shift);
+  std::ranges::copy(std::as_bytes(std::span(options.simplified)), rest + 2);
   return uuid_of(text);
 }
 
@@ -86,15 +90,35 @@ void repage_channels(const ContainerReader& container, ContainerWriter& writer) 
   }
 }
 
+/// Says whether surfels are merged: those of a container with channels are not, since these have
+/// values for each.
+bool merges_points(const Simplification& simplification, const ContainerReader& container) {
+  return simplification.merging.growth > 1 && container.meta().channels.empty();
+}
+
 /// Builds the octree again from the points of a container, and moves its channels.
-/// @param round  rounds the points
-Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer, bool round,
+/// @param rounding  of the points; empty: none
+/// @param merged    what a simplification has merged
+Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writer,
+                         const std::optional<PointRounding>& rounding,
+                         const std::optional<Simplification>& simplification, MergeCounts& merged,
                          const Executor& executor, Progress& progress) {
-  const Superblock& from = container.superblock();
-  ContainerPoints points(container);
-  const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
+  const double unit = container.header().frame.unit();
+  ContainerPoints all(container);
+  const BuildOptions tree{.leaf_points = simplification
+                                             ? simplification->leaf_points
+                                             : std::max(1U, container.superblock().leaf_points)};
+  const bool merges = simplification && merges_points(*simplification, container);
+  std::optional<RimRays> rim;
+  if (merges) rim.emplace(container);
+  const SurfaceGoesOn goes_on = [&](const PointRecord& disc, float finest) {
+    return rim->meet(disc, finest);
+  };
+  const std::unique_ptr<PointStream> flat =
+      merges ? merge_flat_cells(all, unit, simplification->merging, goes_on, merged) : nullptr;
+  PointStream& points = flat ? *flat : all;
   const std::unique_ptr<PointStream> rounded =
-      round ? round_points(points, container.header().frame.unit(), executor) : nullptr;
+      rounding ? round_points(points, unit, executor, {}, *rounding) : nullptr;
   const Superblock superblock =
       build_pages(rounded ? *rounded : points, writer, tree, executor, progress);
   repage_channels(container, writer);
@@ -102,14 +126,20 @@ Superblock rebuild_pages(const ContainerReader& container, ContainerWriter& writ
 }
 
 Superblock write_container(const ContainerReader& container, const std::filesystem::path& target,
-                           const RecodeOptions& options, Progress& progress) {
+                           const RecodeOptions& options, MergeCounts& merged, Progress& progress) {
   at_offset(container.file(), 0, [&] { check_copyable(container.header()); });
   // Complete the record: rounding is noted once
   const FileHeader& from = container.header();
   const std::uint8_t page_shift = options.page_shift.value_or(from.page_shift);
   Meta meta = container.meta();
-  const bool round =
-      is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second;
+  std::optional<PointRounding> rounding;
+  if (options.simplification) {
+    rounding = options.simplification->rounding;
+    meta.text[kRoundingKey] = rounding_text(*rounding);
+    meta.text[kSimplifiedKey] = options.simplified;
+  } else if (is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second) {
+    rounding.emplace();
+  }
   check_meta(meta, page_shift, from.point_bytes);
 
   // Check the memory cap
@@ -121,14 +151,16 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   charge_directory(budget, container);
   budget.charge("pages that are written",
                 ContainerWriter::memory_bytes(pages, page_shift, executor.threads()));
-  const bool same_pages = page_shift == from.page_shift && !round && container.parts().empty();
+  const bool same_pages = page_shift == from.page_shift && !rounding && container.parts().empty();
   if (!same_pages) budget.charge("node pages that wait", held_pages_bytes(page_shift));
+  if (options.simplification && merges_points(*options.simplification, container))
+    budget.charge("rays at the surfels", RimRays::least_bytes(container));
   budget.require();
 
   // Copy the pages where they stay as they are, build them again elsewhere
   ContainerWriter writer(target, {.page_shift = page_shift,
                                   .codec = codec_of(options.profile),
-                                  .uuid = derived_uuid(container, options.profile, page_shift),
+                                  .uuid = derived_uuid(container, options, page_shift),
                                   .frame = from.frame,
                                   .point_bytes = from.point_bytes,
                                   .source = &container.file()});
@@ -136,7 +168,8 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   if (same_pages) {
     copy_pages(container, writer, progress);
   } else {
-    superblock = rebuild_pages(container, writer, round, executor, progress);
+    superblock = rebuild_pages(container, writer, rounding, options.simplification, merged,
+                               executor, progress);
     superblock.writer.clear();
   }
   return writer.finish(meta, superblock);
@@ -160,7 +193,8 @@ ConvertReport recode_container(const ContainerReader& container,
   ConvertReport report{.points = container.superblock().points};
   {
     const Stage stage(report.seconds, progress, "convert", report.points, "points");
-    report.superblock = write_container(container, target, options, progress);
+    report.superblock = write_container(container, target, options, report.merged, progress);
+    report.points = report.superblock->points;
   }
   return report;
 }

@@ -8,9 +8,11 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "engine/base/progress.h"
 #include "engine/octree/rounding.h"
+#include "engine/pipeline/convert/simplification.h"
 #include "engine/pipeline/run.h"
 #include "engine/store/reader.h"
 
@@ -24,19 +26,25 @@ namespace ptc {
 struct RecodeOptions {
   Profile profile = Profile::exact;        ///< how points are rounded and compressed
   std::optional<std::uint8_t> page_shift;  ///< a page has 2^page_shift bytes; empty: as before
-  RunOptions run;                          ///< memory and threads; there are no temporary files
+  /// What is simplified, for a profile that is_rounded(); empty: nothing. The points of a container
+  /// with channels are not merged.
+  std::optional<Simplification> simplification;
+  std::string simplified;  ///< the text kSimplifiedKey of a container that is simplified
+  RunOptions run;          ///< memory and threads; there are no temporary files
 };
 
 /// The result of a conversion, and what it cost.
 struct ConvertReport {
   std::uint64_t points = 0;              ///< number of points that were written
   std::optional<Superblock> superblock;  ///< of the target when it is a container
+  MergeCounts merged;                    ///< by a simplification
   StageSeconds seconds;                  ///< wall time of each stage
 };
 
 /// Writes a container again: the same points, channels and record in another profile or page size.
 ///
-/// Points that are rounded already stay as they are, whatever the profile. When the page size stays
+/// Points that are rounded already stay as they are, whatever the profile, unless they are
+/// simplified. When the page size stays
 /// and no points are to be rounded, pages keep their order and their numbers; otherwise the octree
 /// is built again from the points. The same input gives the same bytes. The target is published
 /// when it is complete; a conversion that throws leaves it as it was.

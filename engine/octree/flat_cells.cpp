@@ -1,0 +1,377 @@
+// A stack holds what has been seen of the cells that are open at the current point: clusters, each
+// a surfel or a whole cell. `join` of a cluster is the level of the smallest cell that holds it and
+// the cluster below it on the stack.
+//
+//   join   4 6 6 | 3     the next point joins at level 3, so the cell of level 6, of the three
+//          A B C   next  clusters A B C, is complete: they become one cluster, or all go out
+//
+// A cluster that a disc of its area covers becomes one surfel. Another one keeps its surfels, and
+// may still be a part of a larger one that does. When a cell is too large, bends too much or is lit
+// unevenly, all cells around it are: the whole stack goes out.
+//
+// Surfels that face to one side of a direction have a stack of their own, and those that face to
+// the other: so both sides of a sheet are merged. What goes out of the two is put into one order
+// again.
+#include "engine/octree/flat_cells.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <ranges>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec3.hpp>
+
+#include "engine/base/basis.h"
+#include "format/morton.h"
+#include "format/point_record.h"
+#include "format/scalar.h"
+
+namespace ptc {
+namespace {
+
+// The least reach of surfels from their mean, over the radius of a disc of their area. It is 1 in a
+// square and 0.88 in a hexagon; surfels that lie over each other reach less far.
+constexpr double kDensest = 0.9;
+
+/// Sums of a colour over surfels, by area.
+struct ColourSums {
+  glm::dvec3 first{0}, second{0};  ///< of the values, of their squares
+
+  void add(const glm::dvec3& value, double area) {
+    first += area * value;
+    second += area * value * value;
+  }
+  void add(const ColourSums& other) {
+    first += other.first;
+    second += other.second;
+  }
+  [[nodiscard]] double square() const { return second.x + second.y + second.z; }
+  /// Returns the sum of the squares by which the values differ from their mean.
+  [[nodiscard]] double change(double area) const {
+    return std::max(0.0, square() - glm::dot(first, first) / area);
+  }
+  /// Says whether the values deviate from their mean by at most `contrast` of its brightest
+  /// channel.
+  [[nodiscard]] bool is_even(double area, double contrast) const {
+    const glm::dvec3 mean = first / area, variance = second / area - mean * mean;
+    const double brightest = std::max({mean.x, mean.y, mean.z});
+    constexpr double kRounding = 1e-12;  // what it leaves of equal values
+    return std::max({variance.x, variance.y, variance.z}) <=
+           (contrast * contrast + kRounding) * brightest * brightest;
+  }
+};
+
+glm::dvec3 colour_of(const Half3& half) {
+  return {decode_half(half[0]), decode_half(half[1]), decode_half(half[2])};
+}
+
+Half3 to_halves(const glm::dvec3& colour) {
+  const glm::vec3 c(colour);
+  return {encode_half(c.x), encode_half(c.y), encode_half(c.z)};
+}
+
+/// Sums over surfels. Lengths are in lattice units.
+struct ClusterSums {
+  std::uint64_t count = 1;  ///< of the surfels
+  double area = 0;          ///< of all
+  glm::dvec3 mean{0};       ///< of their positions, by area
+  double reach = 0;         ///< greatest distance of their rims from the mean, at most
+  glm::dvec3 facing{0};     ///< sum of their normals, by area
+  glm::dmat3 spread{0};     ///< second moments about the mean of the squares that they stand for
+  ColourSums radiance, emission, albedo;
+
+  ClusterSums(const PointRecord& point, double unit) : reach(double{point.radius} / unit) {
+    area = 2 * reach * reach;
+    const LatticePoint at = decode_morton(point.key);
+    mean = {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
+    const auto n = decode_octahedral_f64(point.normal[0], point.normal[1]);
+    const glm::dvec3 normal(n[0], n[1], n[2]);
+    facing = area * normal;
+    spread = area * area / 12 * (glm::dmat3(1) - glm::outerProduct(normal, normal));
+    radiance.add(colour_of(point.radiance), area);
+    emission.add(colour_of(point.emission), area);
+    albedo.add({point.albedo[0], point.albedo[1], point.albedo[2]}, area);
+  }
+
+  /// Adds other surfels, but for the reach. @pre one of the areas is not 0
+  void add(const ClusterSums& other) {
+    const double sum = area + other.area;
+    const glm::dvec3 way = other.mean - mean;
+    spread += other.spread + area * other.area / sum * glm::outerProduct(way, way);
+    mean += other.area / sum * way;
+    facing += other.facing;
+    area = sum;
+    count += other.count;
+    radiance.add(other.radiance);
+    emission.add(other.emission);
+    albedo.add(other.albedo);
+  }
+
+  /// Returns the area of the surfel that stands for them.
+  [[nodiscard]] double covered() const { return glm::length(facing); }
+  /// Returns their mean radius.
+  [[nodiscard]] double finest() const { return std::sqrt(area / static_cast<double>(count) / 2); }
+
+  /// Says whether they are as near to a flat and even surface, and as few, as is asked.
+  [[nodiscard]] bool is_flat(const Flatness& most) const {
+    const double one = covered();
+    if (!(1 - one / area <= most.turn * most.turn / 2)) return false;
+    if (std::sqrt(one / 2) > most.growth * finest()) return false;
+    const glm::dvec3 normal = facing / one;
+    const double height = most.height * finest();
+    return glm::dot(normal, spread * normal) <= height * height * area &&
+           radiance.is_even(area, most.contrast) && emission.is_even(area, most.contrast) &&
+           albedo.is_even(area, most.contrast);
+  }
+
+  /// Says whether the surfel that stands for them covers about what they cover.
+  [[nodiscard]] bool is_round(const Flatness& most) const {
+    const double radius = std::sqrt(covered() / 2);
+    return reach >= kDensest * radius && reach <= most.reach * radius;
+  }
+
+  /// Returns the surfel that stands for them. @param like  gives what is not summed
+  [[nodiscard]] PointRecord surfel(PointRecord like, double unit) const {
+    // Rounded down, it stays within the cell
+    like.key =
+        encode_morton({static_cast<std::uint64_t>(mean.x), static_cast<std::uint64_t>(mean.y),
+                       static_cast<std::uint64_t>(mean.z)});
+    like.radius = static_cast<float>(std::sqrt(covered() / 2) * unit);
+    const glm::vec3 normal(facing / covered());
+    like.normal = encode_octahedral({normal.x, normal.y, normal.z});
+    like.radiance = to_halves(radiance.first / area);
+    like.emission = to_halves(emission.first / area);
+    for (int k = 0; k < 3; ++k) {
+      like.albedo[static_cast<std::size_t>(k)] =
+          static_cast<std::uint8_t>(std::lround(albedo.first[k] / area));
+    }
+    return like;
+  }
+
+  /// Returns what becomes of them. @param one  whether one surfel stands for all
+  [[nodiscard]] MergeCounts counts(bool one) const {
+    MergeCounts counts{.points = count,
+                       .light_square = radiance.square() + emission.square(),
+                       .albedo_square = albedo.square()};
+    if (!one) return counts;
+    counts.merged = count;
+    counts.made = 1;
+    counts.light_change = radiance.change(area) + emission.change(area);
+    counts.albedo_change = albedo.change(area);
+    return counts;
+  }
+};
+
+/// A surfel, or the surfels of a cell.
+struct Cluster {
+  ClusterSums sums;                 ///< over the surfels that came
+  int join = -1;                    ///< see above; -1 for the first one of all
+  std::vector<PointRecord> points;  ///< that stand for them
+  MergeCounts counts;
+};
+
+ClusterSums sums_of(std::span<const Cluster> clusters) {
+  ClusterSums all = clusters.front().sums;
+  for (const Cluster& cluster : clusters.subspan(1)) all.add(cluster.sums);
+  all.reach = 0;
+  for (const Cluster& cluster : clusters)
+    all.reach =
+        std::max(all.reach, glm::distance(cluster.sums.mean, all.mean) + cluster.sums.reach);
+  return all;
+}
+
+/// The limits of a merge, and what it asks.
+struct Rules {
+  double unit;
+  Flatness most;
+  const SurfaceGoesOn& goes_on;
+  MergeCounts& counts;
+};
+
+/// The surfels that face to one side. Those that face the other way may lie at the same places, as
+/// they do on a sheet of which both sides are seen.
+class Side {
+ public:
+  explicit Side(const Rules& rules) : rules_(rules) {}
+
+  void take(const PointRecord& point) {
+    const int level = before_ ? common_level(*before_, point.key) : -1;
+    close(level);
+    before_ = point.key;
+    const ClusterSums sums(point, rules_.unit);
+    open_.push_back({sums, level, {point}, sums.counts(false)});
+    // Neither surfels at one place nor those without an area become one
+    if (level == kLatticeBits || !(sums.area > 0)) flush();
+  }
+
+  void end() {
+    close(-1);
+    flush();
+  }
+
+  /// Returns a key that no surfel which is still open will precede; nothing when none is open.
+  [[nodiscard]] std::optional<MortonKey> begin_of_open() const {
+    if (open_.empty()) return std::nullopt;
+    // A cell that holds what went out before is merged no more
+    return cell_of(open_.front().points.front().key, open_.front().join + 1);
+  }
+
+  std::vector<PointRecord> ready;  ///< to be handed out, by ascending key
+
+ private:
+  /// Closes all cells below a level.
+  void close(int level) {
+    while (!open_.empty() && open_.back().join > level) {
+      // The clusters of the smallest cell are those of its level, and the one before them
+      const int cell = open_.back().join;
+      std::size_t begin = open_.size() - 1;
+      while (begin > 0 && open_[begin].join == cell) --begin;
+      if (open_[begin].join == cell || !merge(begin)) flush();  // or the one before went out
+    }
+  }
+
+  /// Makes the open clusters from `begin` on one. Returns false, and leaves them, when they may not
+  /// be.
+  bool merge(std::size_t begin) {
+    const ClusterSums sums = sums_of(std::span(open_).subspan(begin));
+    if (!sums.is_flat(rules_.most)) return false;
+    Cluster& all = open_[begin];
+    all.sums = sums;
+    const PointRecord one = sums.surfel(all.points.front(), rules_.unit);
+    if (sums.is_round(rules_.most) &&
+        rules_.goes_on(one, static_cast<float>(sums.finest() * rules_.unit))) {
+      all.points = {one};
+      all.counts = sums.counts(true);
+    } else {
+      for (std::size_t i = begin + 1; i < open_.size(); ++i) {
+        all.points.insert(all.points.end(), open_[i].points.begin(), open_[i].points.end());
+        all.counts += open_[i].counts;
+      }
+    }
+    open_.erase(open_.begin() + static_cast<std::ptrdiff_t>(begin) + 1, open_.end());
+    return true;
+  }
+
+  /// Hands all open clusters out.
+  void flush() {
+    for (const Cluster& cluster : open_) {
+      ready.insert(ready.end(), cluster.points.begin(), cluster.points.end());
+      rules_.counts += cluster.counts;
+    }
+    open_.clear();
+  }
+
+  const Rules& rules_;
+  std::optional<MortonKey> before_;  ///< of the point that came last
+  std::vector<Cluster> open_;        ///< at most 8 for each level
+};
+
+/// The stream that merge_flat_cells() returns.
+class MergedStream : public PointStream {
+ public:
+  MergedStream(PointStream& sorted, const Rules& rules)
+      : sorted_(sorted), rules_(rules), block_(kBlock) {}
+
+  std::size_t next(std::span<PointRecord> out) override {
+    while (done_ == ready_.size() && !ended_) {
+      const std::size_t count = sorted_.next(block_);
+      for (const PointRecord& point : std::span(block_).first(count)) side_of(point).take(point);
+      if (count == 0) {
+        for (Side& side : sides_) side.end();
+        ended_ = true;
+      }
+      collect();
+    }
+    const std::size_t count = std::min(out.size(), ready_.size() - done_);
+    std::copy_n(ready_.begin() + static_cast<std::ptrdiff_t>(done_), count, out.begin());
+    done_ += count;
+    return count;
+  }
+
+ private:
+  static constexpr std::size_t kBlock = 4096;  // points that are taken at once
+
+  Side& side_of(const PointRecord& point) {
+    // No wall that is parallel to an axis or to a diagonal lies along this direction
+    constexpr std::array<double, 3> kAlong{0.80, 0.51, 0.33};
+    const auto n = decode_octahedral_f64(point.normal[0], point.normal[1]);
+    return sides_[n[0] * kAlong[0] + n[1] * kAlong[1] + n[2] * kAlong[2] < 0 ? 1 : 0];
+  }
+
+  /// Moves what nothing can precede any more from both sides into ready_, in order.
+  void collect() {
+    ready_.clear();
+    done_ = 0;
+    std::optional<MortonKey> until;
+    for (const Side& side : sides_) {
+      const auto begin = side.begin_of_open();
+      if (begin && (!until || *begin < *until)) until = begin;
+    }
+    std::array<std::size_t, 2> count{};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto& ready = sides_[i].ready;
+      count[i] = ready.size();
+      if (until) {
+        count[i] = static_cast<std::size_t>(
+            std::ranges::lower_bound(ready, *until, {}, &PointRecord::key) - ready.begin());
+      }
+    }
+    const auto end_of = [&](std::size_t i) {
+      return sides_[i].ready.begin() + static_cast<std::ptrdiff_t>(count[i]);
+    };
+    std::ranges::merge(std::ranges::subrange(sides_[0].ready.begin(), end_of(0)),
+                       std::ranges::subrange(sides_[1].ready.begin(), end_of(1)),
+                       std::back_inserter(ready_), {}, &PointRecord::key, &PointRecord::key);
+    for (std::size_t i = 0; i < 2; ++i) sides_[i].ready.erase(sides_[i].ready.begin(), end_of(i));
+  }
+
+  PointStream& sorted_;
+  const Rules rules_;
+  std::array<Side, 2> sides_{Side(rules_), Side(rules_)};
+  std::vector<PointRecord> block_;
+  std::vector<PointRecord> ready_;  ///< to be handed out
+  std::size_t done_ = 0;            ///< of them
+  bool ended_ = false;
+};
+
+double share(double part, double whole) {
+  return whole > 0 ? std::sqrt(part / whole) : 0.0;
+}
+
+}  // namespace
+
+MergeCounts& MergeCounts::operator+=(const MergeCounts& other) noexcept {
+  points += other.points;
+  merged += other.merged;
+  made += other.made;
+  light_square += other.light_square;
+  light_change += other.light_change;
+  albedo_square += other.albedo_square;
+  albedo_change += other.albedo_change;
+  return *this;
+}
+
+double MergeCounts::light_error() const noexcept {
+  return share(light_change, light_square);
+}
+
+double MergeCounts::albedo_error() const noexcept {
+  return share(albedo_change, albedo_square);
+}
+
+std::unique_ptr<PointStream> merge_flat_cells(PointStream& sorted, double unit,
+                                              const Flatness& most, const SurfaceGoesOn& goes_on,
+                                              MergeCounts& counts) {
+  return std::make_unique<MergedStream>(sorted, Rules{unit, most, goes_on, counts});
+}
+
+}  // namespace ptc
