@@ -106,6 +106,7 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
 measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
 measure stability stability -- --row 3 --row 12
 measure surfels surfels fractal window cornell "$mesh+backdrop" -- cornell --points 2k "${once[@]}"
+measure tolerance tolerance fractal window cornell city "$mesh+backdrop" -- cornell --points 4k --receivers 200 "${once[@]}"
 measure truth truth --points 100k --size 128x96 --paths 512 --python python3 -- --paths 32 --points 5k --size 32x24
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 

@@ -61,6 +61,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_specks_experiment();
 [[nodiscard]] Experiment make_stability_experiment();
 [[nodiscard]] Experiment make_surfels_experiment();
+[[nodiscard]] Experiment make_tolerance_experiment();
 [[nodiscard]] Experiment make_truth_experiment();
 [[nodiscard]] Experiment make_verify_experiment();
 
