@@ -144,7 +144,11 @@ std::vector<std::string> container_losses(const Arguments& arguments, bool recod
     losses.emplace_back("Positions are rounded to 2^-42 of the edge of a cube around the points.");
     losses.emplace_back("Normals are rounded by up to 0.0001 rad, colours to 8 bits of sRGB.");
   }
-  if (ptc::is_rounded(arguments.profile)) {
+  if (arguments.tolerance) {
+    losses.push_back(
+        fmt::format("Points are merged and rounded as far as an error of {:.4g} % allows.",
+                    100 * *arguments.tolerance));
+  } else if (ptc::is_rounded(arguments.profile)) {
     losses.emplace_back(
         "Positions are rounded by up to 0.001 radii, radii by 1/512, normals by 0.0021 rad, "
         "radiances by 1/256.");

@@ -41,6 +41,9 @@ namespace {
 // The least reach of surfels from their mean, over the radius of a disc of their area. It is 1 in a
 // square and 0.88 in a hexagon; surfels that lie over each other reach less far.
 constexpr double kDensest = 0.9;
+// The greatest edge of a cell that is merged, in radii that its least surfel may grow to. A wall
+// takes a square of sqrt(2) of them, or somewhat more of a cell that it crosses at an angle.
+constexpr double kWidest = 4;
 
 /// Sums of a colour over surfels, by area.
 struct ColourSums {
@@ -85,11 +88,13 @@ struct ClusterSums {
   double area = 0;          ///< of all
   glm::dvec3 mean{0};       ///< of their positions, by area
   double reach = 0;         ///< greatest distance of their rims from the mean, at most
+  double least = 0;         ///< least of their radii
   glm::dvec3 facing{0};     ///< sum of their normals, by area
   glm::dmat3 spread{0};     ///< second moments about the mean of the squares that they stand for
   ColourSums radiance, emission, albedo;
 
-  ClusterSums(const PointRecord& point, double unit) : reach(double{point.radius} / unit) {
+  ClusterSums(const PointRecord& point, double unit)
+      : reach(double{point.radius} / unit), least(reach) {
     area = 2 * reach * reach;
     const LatticePoint at = decode_morton(point.key);
     mean = {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
@@ -111,6 +116,7 @@ struct ClusterSums {
     facing += other.facing;
     area = sum;
     count += other.count;
+    least = std::min(least, other.least);
     radiance.add(other.radiance);
     emission.add(other.emission);
     albedo.add(other.albedo);
@@ -139,12 +145,19 @@ struct ClusterSums {
     return reach >= kDensest * radius && reach <= most.reach * radius;
   }
 
-  /// Returns the surfel that stands for them. @param like  gives what is not summed
-  [[nodiscard]] PointRecord surfel(PointRecord like, double unit) const {
-    // Rounded down, it stays within the cell
-    like.key =
-        encode_morton({static_cast<std::uint64_t>(mean.x), static_cast<std::uint64_t>(mean.y),
-                       static_cast<std::uint64_t>(mean.z)});
+  /// Returns the surfel that stands for them.
+  /// @param like   one of them, which gives what is not summed
+  /// @param level  of the cell that they fill
+  [[nodiscard]] PointRecord surfel(PointRecord like, int level, double unit) const {
+    // The mean lies in the cell, but for what sums of doubles round
+    const LatticePoint low = decode_morton(cell_of(like.key, level));
+    const std::uint64_t last = (std::uint64_t{1} << (kLatticeBits - level)) - 1;
+    LatticePoint at;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double of_k = std::max(mean[static_cast<int>(k)], 0.0);
+      at[k] = std::clamp(static_cast<std::uint64_t>(of_k), low[k], low[k] + last);
+    }
+    like.key = encode_morton(at);
     like.radius = static_cast<float>(std::sqrt(covered() / 2) * unit);
     const glm::vec3 normal(facing / covered());
     like.normal = encode_octahedral({normal.x, normal.y, normal.z});
@@ -218,11 +231,21 @@ class Side {
     flush();
   }
 
+  /// Hands out what no point from a key on can be merged with. @pre take() had no later one
+  void pass(const MortonKey& key) {
+    if (open_.empty()) return;
+    close(common_level(*before_, key));
+    while (!open_.empty() &&
+           common_level(open_.front().points.front().key, key) < widest_of(open_.front().sums)) {
+      hand_out(open_.front());
+      open_.erase(open_.begin());
+    }
+  }
+
   /// Returns a key that no surfel which is still open will precede; nothing when none is open.
   [[nodiscard]] std::optional<MortonKey> begin_of_open() const {
     if (open_.empty()) return std::nullopt;
-    // A cell that holds what went out before is merged no more
-    return cell_of(open_.front().points.front().key, open_.front().join + 1);
+    return cell_of(open_.front().points.front().key, widest_of(open_.front().sums));
   }
 
   std::vector<PointRecord> ready;  ///< to be handed out, by ascending key
@@ -242,11 +265,12 @@ class Side {
   /// Makes the open clusters from `begin` on one. Returns false, and leaves them, when they may not
   /// be.
   bool merge(std::size_t begin) {
+    const int cell = open_.back().join;
     const ClusterSums sums = sums_of(std::span(open_).subspan(begin));
-    if (!sums.is_flat(rules_.most)) return false;
+    if (cell < widest_of(sums) || !sums.is_flat(rules_.most)) return false;
     Cluster& all = open_[begin];
     all.sums = sums;
-    const PointRecord one = sums.surfel(all.points.front(), rules_.unit);
+    const PointRecord one = sums.surfel(all.points.front(), cell, rules_.unit);
     if (sums.is_round(rules_.most) &&
         rules_.goes_on(one, static_cast<float>(sums.finest() * rules_.unit))) {
       all.points = {one};
@@ -261,12 +285,20 @@ class Side {
     return true;
   }
 
+  /// Returns the level of the widest cell that may be merged with these surfels in it.
+  [[nodiscard]] int widest_of(const ClusterSums& sums) const {
+    const double edge = std::max(kWidest * rules_.most.growth * sums.least, 1.0);
+    return std::max(kLatticeBits - std::min(std::ilogb(edge), kLatticeBits), 0);
+  }
+
+  void hand_out(const Cluster& cluster) {
+    ready.insert(ready.end(), cluster.points.begin(), cluster.points.end());
+    rules_.counts += cluster.counts;
+  }
+
   /// Hands all open clusters out.
   void flush() {
-    for (const Cluster& cluster : open_) {
-      ready.insert(ready.end(), cluster.points.begin(), cluster.points.end());
-      rules_.counts += cluster.counts;
-    }
+    for (const Cluster& cluster : open_) hand_out(cluster);
     open_.clear();
   }
 
@@ -285,10 +317,14 @@ class MergedStream : public PointStream {
     while (done_ == ready_.size() && !ended_) {
       const std::size_t count = sorted_.next(block_);
       for (const PointRecord& point : std::span(block_).first(count)) side_of(point).take(point);
-      if (count == 0) {
-        for (Side& side : sides_) side.end();
-        ended_ = true;
+      for (Side& side : sides_) {
+        if (count > 0) {
+          side.pass(block_[count - 1].key);
+        } else {
+          side.end();
+        }
       }
+      ended_ = count == 0;
       collect();
     }
     const std::size_t count = std::min(out.size(), ready_.size() - done_);

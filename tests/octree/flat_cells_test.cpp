@@ -200,6 +200,23 @@ TEST_CASE("flat cells: points at one place and without a radius stay, however ma
   CHECK(after.surfels.size() == surfels.size() - after.counts.merged + after.counts.made);
 }
 
+TEST_CASE("flat cells: a side of which little is left does not hold up the other",
+          "[build][merge]") {
+  // A wall, and one surfel at its beginning that faces the other way
+  std::vector<Surfel> surfels;
+  add_rectangle(surfels, {1.0 / 3, 0, 0}, {0, 1, 0}, {0, 0, 1}, 1.0 / 512, {1, 1, 1});
+  surfels.push_back(surfels.front());
+  surfels.back().normal = -surfels.back().normal;
+  const SortedScene scene = sort_scene(surfels);
+  VectorStream stream(scene.records);
+  MergeCounts counts;
+  const SurfaceGoesOn goes_on = goes_on_everywhere;
+  const auto merged = merge_flat_cells(stream, scene.frame.unit(), kLoose, goes_on, counts);
+  std::vector<PointRecord> one(1);
+  REQUIRE(merged->next(one) == 1);
+  CHECK(counts.points < surfels.size() / 10);  // the first surfel is there before the last was read
+}
+
 TEST_CASE("flat cells: blocks do not matter", "[build][merge]") {
   const std::vector<Surfel> surfels = small_scene(0.02);
   const Merged all = merge(surfels), one = merge(surfels, kLoose, goes_on_everywhere, 1);

@@ -21,7 +21,7 @@ namespace ptc::bench {
 struct ToleranceOptions {
   std::vector<double> tolerances{0.01, 0.03, 0.1};  ///< shares, ascending
   std::uint64_t points = 1'000'000;                 ///< of the exact container, about
-  std::uint64_t receivers = 100'000;                ///< points of it that are shaded
+  std::uint64_t receivers = 50'000;                 ///< points of it that are shaded
   unsigned repeats = 5;                             ///< shadings with each container
 };
 

@@ -78,7 +78,7 @@ Experiment make_tolerance_experiment() {
     d.scenes(*scenes);
     d.points(options->points, "1M", 100'000);
     d.count("--receivers", options->receivers, "Number of points that are shaded, spread evenly",
-            "100k");
+            "50k");
     d.quick("--receivers", options->receivers, 10'000);
     d.repeats(options->repeats, 1);
   };
