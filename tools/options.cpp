@@ -343,7 +343,9 @@ CLI::Option* add_tolerance(CLI::App& app, std::optional<double>& tolerance) {
       "is flat and evenly lit become one, and what is left is rounded more coarsely. How far this "
       "goes is tried in temporary containers: the error is that of occlusion and of light at 2,048 "
       "points, by rays at what is stored against rays at all points, and that of the light that "
-      "points send out. Points with channels, such as the intensity of a scan, are rounded alone. "
+      "points send out and of their albedo. Where even the finest rounding, 0.23 % off, is too "
+      "coarse, the report says so. Points with channels, such as the intensity of a scan, are "
+      "rounded alone. "
       "ptcinfo --why tells what was chosen.");
 }
 

@@ -180,6 +180,7 @@ void declare_container(CLI::App& app, Arguments& arguments) {
       ->group("Container");
   ptc::add_integer(app, "--levels-per-stream", request.tree.levels_per_stream, 1, 63,
                    "Octree levels that share one stream of node pages")
+      ->excludes("--tolerance")
       ->group(ptc::kExpertGroup);
 }
 
@@ -247,6 +248,7 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
   if (!request.append.empty()) adopt_settings(arguments, command);
   note_options_of_meshes(arguments, command.app(), progress);
   if (request.append.empty()) ptc::note_unknown_up(request.inputs, request.up, progress);
+  if (arguments.tolerance) ptc::check_tolerance(*arguments.tolerance, request.profile);
   ptc::StageSeconds choosing;
   std::optional<ptc::SurfelChoice> choice;
   if (arguments.error) {

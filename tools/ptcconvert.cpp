@@ -137,17 +137,17 @@ void note_unused_options(const Arguments& arguments, const CLI::App& app, ptc::P
 }
 
 /// Returns what a container would round of points, a sentence each.
-/// @param recoded  whether they are those of a container already
-std::vector<std::string> container_losses(const Arguments& arguments, bool recoded) {
+/// @param recoded   whether they are those of a container already
+/// @param channels  whether they have channels
+std::vector<std::string> container_losses(const Arguments& arguments, bool recoded, bool channels) {
   std::vector<std::string> losses;
   if (!recoded) {
     losses.emplace_back("Positions are rounded to 2^-42 of the edge of a cube around the points.");
     losses.emplace_back("Normals are rounded by up to 0.0001 rad, colours to 8 bits of sRGB.");
   }
   if (arguments.tolerance) {
-    losses.push_back(
-        fmt::format("Points are merged and rounded as far as an error of {:.4g} % allows.",
-                    100 * *arguments.tolerance));
+    losses.push_back(fmt::format("Points are {}rounded as far as an error of {:.4g} % allows.",
+                                 channels ? "" : "merged and ", 100 * *arguments.tolerance));
   } else if (ptc::is_rounded(arguments.profile)) {
     losses.emplace_back(
         "Positions are rounded by up to 0.001 radii, radii by 1/512, normals by 0.0021 rad, "
@@ -169,7 +169,8 @@ ptc::Outcome tell_losses(Arguments arguments, ptc::Progress& progress) {
           : ptc::describe_points(arguments.input, arguments.points, format, progress);
   std::vector<std::string> losses;
   if (to_container) {
-    losses = container_losses(arguments, from_container && !arguments.points.selection.level);
+    losses = container_losses(arguments, from_container && !arguments.points.selection.level,
+                              !info.channels.empty());
   } else if (format) {
     losses = ptc::losses(*format, info);
   }
@@ -244,6 +245,7 @@ int main(int argc, char** argv) {
     arguments.points.run = command.run_options();
     arguments.page_size_given = page_size->count() > 0;
     if (arguments.tolerance && profile->count() == 0) arguments.profile = ptc::Profile::compact;
+    if (arguments.tolerance) ptc::check_tolerance(*arguments.tolerance, arguments.profile);
     if (arguments.dry_run) return tell_losses(arguments, progress);
     note_unused_options(arguments, command.app(), progress);
     const auto [report, choice] = convert(arguments, command.run_options(), progress);

@@ -330,10 +330,10 @@ std::string choice_text(const SimplificationChoice& choice) {
   const SimplificationTrial& taken = choice.taken;
   return fmt::format(
       "  tolerance: {:.4g} % asked{}, light that arrives {} off, light that leaves {:.2f} %, "
-      "{} trials\n",
+      "albedo {:.2f} %, {} trials\n",
       100 * choice.asked, choice.met ? "" : " and not met",
       bounded_text(taken.found.error.relative(), taken.found.low, taken.found.high),
-      100 * taken.light_error, choice.trials.size());
+      100 * taken.light_error, 100 * taken.albedo_error, choice.trials.size());
 }
 
 std::string light_text(const std::string& output, const LightReport& report) {

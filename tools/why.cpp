@@ -114,13 +114,14 @@ std::string why_text(const ordered_json& why) {
   std::string text;
   const auto simplified = why.find("simplified");
   if (simplified == why.end()) {
-    text += "  why       no tolerance was asked for, so every point is stored\n";
+    text += "  why       no tolerance was asked for, so no points are merged\n";
   } else {
     const auto percent = [&](const char* key) { return 100 * number(*simplified, key); };
     text += fmt::format(
         "  why       a tolerance of {:.3g} % was asked for: what arrives at points is {:.2f} % "
-        "[{:.2f}, {:.2f}] off, what leaves them {:.2f} %\n",
-        percent("tolerance"), percent("error"), percent("low"), percent("high"), percent("light"));
+        "[{:.2f}, {:.2f}] off, what leaves them {:.2f} %, albedo {:.2f} %{}\n",
+        percent("tolerance"), percent("error"), percent("low"), percent("high"), percent("light"),
+        percent("albedo"), simplified->contains("before") ? "; on top of an earlier one" : "");
     const double points = number(*simplified, "points"), merged = number(*simplified, "merged"),
                  made = number(*simplified, "made");
     text += points > 0 ? fmt::format(

@@ -131,7 +131,7 @@ struct ClusterSums {
   [[nodiscard]] bool is_flat(const Flatness& most) const {
     const double one = covered();
     if (!(1 - one / area <= most.turn * most.turn / 2)) return false;
-    if (std::sqrt(one / 2) > most.growth * finest()) return false;
+    if (std::sqrt(area / 2) > most.growth * finest()) return false;
     const glm::dvec3 normal = facing / one;
     const double height = most.height * finest();
     return glm::dot(normal, spread * normal) <= height * height * area &&
@@ -208,6 +208,7 @@ struct Rules {
   Flatness most;
   const SurfaceGoesOn& goes_on;
   MergeCounts& counts;
+  const MortonKey& handed_out;  ///< no surfel may come before this key any more
 };
 
 /// The surfels that face to one side. Those that face the other way may lie at the same places, as
@@ -271,7 +272,7 @@ class Side {
     Cluster& all = open_[begin];
     all.sums = sums;
     const PointRecord one = sums.surfel(all.points.front(), cell, rules_.unit);
-    if (sums.is_round(rules_.most) &&
+    if (sums.is_round(rules_.most) && one.key >= rules_.handed_out &&
         rules_.goes_on(one, static_cast<float>(sums.finest() * rules_.unit))) {
       all.points = {one};
       all.counts = sums.counts(true);
@@ -310,12 +311,13 @@ class Side {
 /// The stream that merge_flat_cells() returns.
 class MergedStream : public PointStream {
  public:
-  MergedStream(PointStream& sorted, const Rules& rules)
-      : sorted_(sorted), rules_(rules), block_(kBlock) {}
+  MergedStream(PointStream& sorted, double unit, const Flatness& most, const SurfaceGoesOn& goes_on,
+               MergeCounts& counts)
+      : sorted_(sorted), rules_{unit, most, goes_on, counts, handed_out_}, block_(kBlock) {}
 
   std::size_t next(std::span<PointRecord> out) override {
     while (done_ == ready_.size() && !ended_) {
-      const std::size_t count = sorted_.next(block_);
+      const std::size_t count = fill();
       for (const PointRecord& point : std::span(block_).first(count)) side_of(point).take(point);
       for (Side& side : sides_) {
         if (count > 0) {
@@ -326,6 +328,7 @@ class MergedStream : public PointStream {
       }
       ended_ = count == 0;
       collect();
+      handed_out_ = begin_of_open().value_or(block_[count > 0 ? count - 1 : 0].key);
     }
     const std::size_t count = std::min(out.size(), ready_.size() - done_);
     std::copy_n(ready_.begin() + static_cast<std::ptrdiff_t>(done_), count, out.begin());
@@ -336,6 +339,18 @@ class MergedStream : public PointStream {
  private:
   static constexpr std::size_t kBlock = 4096;  // points that are taken at once
 
+  /// Fills the block, so that it does not matter how many points the source yields at once.
+  /// @return the number of points; 0 at the end
+  std::size_t fill() {
+    std::size_t count = 0;
+    while (count < kBlock) {
+      const std::size_t more = sorted_.next(std::span(block_).subspan(count));
+      if (more == 0) break;
+      count += more;
+    }
+    return count;
+  }
+
   Side& side_of(const PointRecord& point) {
     // No wall that is parallel to an axis or to a diagonal lies along this direction
     constexpr std::array<double, 3> kAlong{0.80, 0.51, 0.33};
@@ -343,15 +358,21 @@ class MergedStream : public PointStream {
     return sides_[n[0] * kAlong[0] + n[1] * kAlong[1] + n[2] * kAlong[2] < 0 ? 1 : 0];
   }
 
+  /// Returns a key that no surfel which is still open on either side will precede.
+  [[nodiscard]] std::optional<MortonKey> begin_of_open() const {
+    std::optional<MortonKey> first;
+    for (const Side& side : sides_) {
+      const auto begin = side.begin_of_open();
+      if (begin && (!first || *begin < *first)) first = begin;
+    }
+    return first;
+  }
+
   /// Moves what nothing can precede any more from both sides into ready_, in order.
   void collect() {
     ready_.clear();
     done_ = 0;
-    std::optional<MortonKey> until;
-    for (const Side& side : sides_) {
-      const auto begin = side.begin_of_open();
-      if (begin && (!until || *begin < *until)) until = begin;
-    }
+    const std::optional<MortonKey> until = begin_of_open();
     std::array<std::size_t, 2> count{};
     for (std::size_t i = 0; i < 2; ++i) {
       const auto& ready = sides_[i].ready;
@@ -371,6 +392,7 @@ class MergedStream : public PointStream {
   }
 
   PointStream& sorted_;
+  MortonKey handed_out_;  ///< what has been handed out lies before it, or at it
   const Rules rules_;
   std::array<Side, 2> sides_{Side(rules_), Side(rules_)};
   std::vector<PointRecord> block_;
@@ -407,7 +429,7 @@ double MergeCounts::albedo_error() const noexcept {
 std::unique_ptr<PointStream> merge_flat_cells(PointStream& sorted, double unit,
                                               const Flatness& most, const SurfaceGoesOn& goes_on,
                                               MergeCounts& counts) {
-  return std::make_unique<MergedStream>(sorted, Rules{unit, most, goes_on, counts});
+  return std::make_unique<MergedStream>(sorted, unit, most, goes_on, counts);
 }
 
 }  // namespace ptc

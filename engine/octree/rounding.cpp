@@ -37,12 +37,6 @@ std::uint16_t rounded_radiance(std::uint16_t half, int bits) noexcept {
   return static_cast<std::uint16_t>(std::min((half + step / 2) & ~(step - 1), 0x7c00 - step));
 }
 
-/// Rounds a channel of albedo to a multiple of a power of two; 255 stays.
-std::uint8_t rounded_albedo(std::uint8_t channel, int bits) noexcept {
-  const int step = 1 << (8 - bits);
-  return static_cast<std::uint8_t>(std::min((channel + step / 2) & ~(step - 1), 255));
-}
-
 /// The stream that round_points() returns.
 class RoundedStream : public PointStream {
  public:
@@ -88,8 +82,6 @@ class RoundedStream : public PointStream {
       half = rounded_radiance(half, rounding_.radiance_bits);
     for (std::uint16_t& half : point.emission)
       half = rounded_radiance(half, rounding_.radiance_bits);
-    for (std::uint8_t& channel : point.albedo)
-      channel = rounded_albedo(channel, rounding_.albedo_bits);
     point.key = rounded_key(point.key, point.radius, before);
   }
 
@@ -134,12 +126,9 @@ std::string rounding_text(const PointRounding& rounding) {
   // A step along u and v of an octahedral normal turns it by at most 1.57 and sqrt(2) steps [rad]
   const double turn =
       kRoundedNormal * std::exp2(PointRounding{}.normal_bits - rounding.normal_bits);
-  std::string text =
-      fmt::format("position {:.2g} radius, radius 1/{}, normal {:.2g}, radiance 1/{}",
-                  rounding.position, 2 << rounding.radius_bits, turn, 2 << rounding.radiance_bits);
-  if (rounding.albedo_bits < 8)
-    text += fmt::format(", albedo {}/255", 1 << (7 - rounding.albedo_bits));
-  return text;
+  return fmt::format("position {:.2g} radius, radius 1/{}, normal {:.2g}, radiance 1/{}",
+                     rounding.position, 2 << rounding.radius_bits, turn,
+                     2 << rounding.radiance_bits);
 }
 
 }  // namespace ptc

@@ -31,7 +31,6 @@ struct PointRounding {
   int radius_bits = 8;      ///< of a radius behind the leading one, 1 to 22
   int normal_bits = 10;     ///< of a component of a normal besides its sign, 1 to 14
   int radiance_bits = 7;    ///< of radiance and emission behind the leading one, 1 to 9
-  int albedo_bits = 8;      ///< of a channel of albedo, 1 to 8
 
   friend bool operator==(const PointRounding&, const PointRounding&) = default;
 };

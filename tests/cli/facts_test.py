@@ -73,7 +73,7 @@ class Facts(ProgramTest):
         self.assertRegex(why, r"\n  merged    \d+ of \d+ points lie in cells that are flat and evenly lit, and \d+ surfels stand for them\n")
         self.assertRegex(why, r"\n  position  \d\.\d\d bytes a point\n")
         self.assertIn("\n  leaves    of at most 32 points: ", why)
-        self.assertIn("\n  why       no tolerance was asked for, so every point is stored\n", self.succeed("ptcinfo", usual, "--why").stdout)
+        self.assertIn("\n  why       no tolerance was asked for, so no points are merged\n", self.succeed("ptcinfo", usual, "--why").stdout)
         facts = json.loads(self.succeed("ptcinfo", usual, "--why", "--json").stdout)["why"]
         bytes_of_all = facts["bytes_per_point"]
         self.assertEqual(set(bytes_of_all), {"position", "radius", "normal", "radiance", "albedo", "flags"})

@@ -160,6 +160,17 @@ TEST_CASE("simplification: a scene with flat walls takes far fewer bytes, and is
   static_cast<void>(build_simplified(request, 0.03, again, silent));
   CHECK(bytes_of(again) == bytes_of(small));
 
+  // A second tolerance hides nothing of the first
+  const RecodeOptions options{.profile = Profile::compact};
+  StageSeconds seconds;
+  const SimplificationChoice second =
+      choose_simplification(scene, 0.01, options, again, seconds, silent);
+  recode_container(scene, again, simplified(options, second), silent);
+  const ContainerReader twice(again);
+  const auto& text = twice.meta().text;
+  CHECK(text.at(kSimplifiedKey).find("\"before\":{\"tolerance\":0.03") != std::string::npos);
+  CHECK(text.at(kRoundingKey).ends_with("; before: " + scene.meta().text.at(kRoundingKey)));
+
   // The finer, the more is kept
   request.run = {};
   const SimplifiedBuild finer = build_simplified(request, 0.005, again, silent);

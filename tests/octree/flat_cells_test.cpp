@@ -217,6 +217,54 @@ TEST_CASE("flat cells: a side of which little is left does not hold up the other
   CHECK(counts.points < surfels.size() / 10);  // the first surfel is there before the last was read
 }
 
+TEST_CASE("flat cells: what goes out stays in order, wherever a side begins and ends",
+          "[build][merge]") {
+  // A slope whose cells are filled on the diagonal, so that their means lie before their points;
+  // patches of it face the other way, and other patches both ways
+  for (const unsigned patch : {3U, 16U, 40U}) {
+    std::vector<Surfel> slope, surfels;
+    add_rectangle(slope, {0, 1, 0}, {1, -1, 0}, {0, 0, 1}, 1.0 / 200, {1, 1, 1});
+    for (std::size_t i = 0; i < slope.size(); ++i) {
+      const auto x = static_cast<unsigned>(slope[i].position.x * 283) / patch,
+                 z = static_cast<unsigned>(slope[i].position.z * 200) / patch;
+      Surfel other = slope[i];
+      other.normal = -other.normal;
+      const unsigned kind = (x * 7 + z * 13) % 5;
+      if (kind != 0) surfels.push_back(slope[i]);
+      if (kind < 2) surfels.push_back(other);
+    }
+    const Merged all = merge(surfels);
+    CHECK(all.counts.merged > surfels.size() / 4);
+    CHECK(std::ranges::is_sorted(all.records, {}, &PointRecord::key));
+    CHECK(all.surfels.size() == surfels.size() - all.counts.merged + all.counts.made);
+    CHECK(area_of(all.surfels) == Approx(area_of(surfels)).epsilon(1e-3));
+  }
+}
+
+TEST_CASE("flat cells: no surfel comes before one that went out", "[build][merge]") {
+  // The 4,096 points that are read first end with one in a corner of a cell, which goes out at once.
+  // Two of the other side then fill two more corners, and their mean lies before that point
+  std::vector<Surfel> surfels;
+  const Surfel up{.normal = {0, 0, 1}, .radius = 0.1F, .radiance = glm::vec3(1)};
+  const auto add = [&](double x, double y, float radius, float side) {
+    surfels.push_back(up);
+    surfels.back().position = {x, y, 0.5};
+    surfels.back().normal.z = side;
+    surfels.back().radius = radius;
+  };
+  for (int i = 0; i < 4095; ++i) add(8 * (i % 64), 8 * (i / 64), 0.1F, 1);
+  add(512.49, 512.49, 0, 1);
+  add(512.7, 512.2, 0.4F, -1);
+  add(512.2, 512.7, 0.4F, -1);
+  add(1000, 1000, 0.1F, 1);
+  const Merged after = merge(surfels);
+  CHECK(std::ranges::is_sorted(after.records, {}, &PointRecord::key));
+  CHECK(after.surfels.size() == surfels.size());
+  // Without that point they become one
+  surfels.erase(surfels.begin() + 4095);
+  CHECK(merge(surfels).surfels.size() == surfels.size() - 1);
+}
+
 TEST_CASE("flat cells: blocks do not matter", "[build][merge]") {
   const std::vector<Surfel> surfels = small_scene(0.02);
   const Merged all = merge(surfels), one = merge(surfels, kLoose, goes_on_everywhere, 1);

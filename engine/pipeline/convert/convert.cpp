@@ -135,7 +135,10 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
   std::optional<PointRounding> rounding;
   if (options.simplification) {
     rounding = options.simplification->rounding;
-    meta.text[kRoundingKey] = rounding_text(*rounding);
+    // What was simplified before stays as coarse as it is
+    std::string text = rounding_text(*rounding);
+    if (meta.text.contains(kSimplifiedKey)) text += "; before: " + meta.text[kRoundingKey];
+    meta.text[kRoundingKey] = text;
     meta.text[kSimplifiedKey] = options.simplified;
   } else if (is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second) {
     rounding.emplace();

@@ -9,7 +9,7 @@ namespace ptc {
 Flatness merging_of(double coarseness) noexcept {
   if (coarseness <= 0) return {};
   return {.height = 3 * coarseness,
-          .turn = 6 * coarseness,
+          .turn = std::min(6 * coarseness, 1.0),
           .contrast = 3 * coarseness,
           .growth = 2.1 + 20 * coarseness,
           .reach = 1 + 3 * coarseness};
@@ -25,8 +25,7 @@ PointRounding rounding_of(double tolerance) noexcept {
           .radius_bits = bits(0.5, tolerance / 3, kUsual.radius_bits),
           .normal_bits =
               bits(std::ldexp(kRoundedNormal, kUsual.normal_bits), tolerance, kUsual.normal_bits),
-          .radiance_bits = bits(0.5, 2 * tolerance / 3, kUsual.radiance_bits),
-          .albedo_bits = bits(128.0 / 255, tolerance / 3, kUsual.albedo_bits)};
+          .radiance_bits = bits(0.5, 2 * tolerance / 3, kUsual.radiance_bits)};
 }
 
 double light_error(const PointRounding& rounding) noexcept {

@@ -21,9 +21,7 @@ constexpr std::uint64_t kSeed = std::uint64_t{1} << 53;  // far from the seeds o
 
 PointJudge::PointJudge(const ContainerReader& exact, const RunOptions& run,
                        const std::filesystem::path& target, const Executor& executor)
-    : exact_(exact), run_(run), executor_(executor) {
-  Progress silent;
-  lights_ = recorded_lights(exact, run, target, silent);
+    : exact_(exact), run_(run), target_(target), executor_(executor) {
   std::vector<Surfel> points(selected_of(exact, kPlaces));
   points.resize(PointCursor(exact, {}, points.size()).next(points));
   for (const Surfel& point : points)
@@ -32,20 +30,21 @@ PointJudge::PointJudge(const ContainerReader& exact, const RunOptions& run,
 }
 
 std::vector<Shading> PointJudge::trace(const ContainerReader& scene) const {
+  Progress silent;
+  const LightRig lights = recorded_lights(exact_, run_, target_, silent);
   MemoryBudget budget = budget_of(run_.memory_bytes, "comparing containers");
   charge_directory(budget, exact_);
   if (&scene != &exact_) charge_directory(budget, scene);
-  charge_sky(budget, lights_.sky);
+  charge_sky(budget, lights.sky);
   const std::uint64_t least =
       RayShader::least_bytes(scene, executor_.threads(), RayOptions{}.back_end);
   RayShader discs(scene,
-                  {.sky = [&](const glm::vec3& way) { return lights_.sky.at(way); },
+                  {.sky = [&](const glm::vec3& way) { return lights.sky.at(way); },
                    .emission = !lit_by_emitters(scene),
                    .memory_bytes = budget.rest("the page cache", least)},
                   executor_);
   const std::vector<Receiver> twice = two_of_each(receivers_);
   std::vector<Shading> traced(twice.size());
-  Progress silent;
   discs.trace(twice, kRays, kSeed, traced, silent);
   return traced;
 }

@@ -34,7 +34,8 @@ class PointJudge {
              const std::filesystem::path& target, const Executor& executor);
 
   /// Returns the errors of a container. Irradiance is that of light from surfaces, as for shading.
-  /// @throws LimitError, FormatError, std::system_error
+  /// @throws LimitError, FormatError, std::system_error; DataError when the picture of the sky is
+  ///         gone
   [[nodiscard]] BoundedError measure(const ContainerReader& other);
 
  private:
@@ -43,8 +44,8 @@ class PointJudge {
 
   const ContainerReader& exact_;
   RunOptions run_;
+  std::filesystem::path target_;
   const Executor& executor_;
-  LightRig lights_;
   std::vector<Receiver> receivers_;
   std::vector<Shading> truth_;  ///< two for each point, side by side
 };

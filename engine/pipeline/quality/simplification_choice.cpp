@@ -13,6 +13,7 @@
 #include "engine/base/memory.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/quality/point_error.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/temporary_container.h"
 
 namespace ptc {
@@ -28,15 +29,15 @@ constexpr double kNear = 1.05;                   // ratio between which nothing 
 
 constexpr char kSubject[] = "tolerance";
 
+using RunTrial = std::function<SimplificationTrial(double, double)>;
+
+}  // namespace
+
 void check_tolerance(double asked, Profile profile) {
   require_request(asked > 0 && asked <= 1, kSubject, "`tolerance` is not above 0 and at most 1");
   require_request(is_rounded(profile), kSubject,
                   "a tolerance needs a profile that rounds points: fast or compact");
 }
-
-using RunTrial = std::function<SimplificationTrial(double, double)>;
-
-}  // namespace
 
 double SimplificationTrial::error() const noexcept {
   return std::max({found.high, light_error, albedo_error});
@@ -61,6 +62,10 @@ std::string SimplificationChoice::record() const {
     record["height"] = flatness.height;
     record["turn"] = flatness.turn;
     record["contrast"] = flatness.contrast;
+  }
+  if (!before.empty()) {
+    nlohmann::ordered_json earlier = nlohmann::ordered_json::parse(before, nullptr, false);
+    if (earlier.is_object()) record["before"] = std::move(earlier);
   }
   return record.dump();
 }
@@ -122,9 +127,13 @@ SimplificationChoice choose_simplification(const ContainerReader& container, dou
         "the container has channels, which have values for each of its points: the "
         "points are stored less exactly, and none are merged");
   }
-  if (container.meta().text.contains(kSimplifiedKey)) {
+  const auto earlier = container.meta().text.find(kSimplifiedKey);
+  if (earlier != container.meta().text.end()) {
     progress.note("the container is simplified already: the error comes on top of what it has");
   }
+  constexpr std::size_t kRecordBytes = 1024;  // of kSimplifiedKey and a longer kRoundingKey
+  check_meta(container.meta(), options.page_shift.value_or(container.header().page_shift),
+             container.header().point_bytes, kRecordBytes);
   const ThreadPool executor(options.run.threads);
   const Stage stage(seconds, progress, "choose what to keep", 0, "points");
   PointJudge judge(container, options.run, target, executor);
@@ -134,6 +143,7 @@ SimplificationChoice choose_simplification(const ContainerReader& container, dou
         options.simplification = Simplification{.merging = merging_of(merging),
                                                 .rounding = rounding_of(rounding),
                                                 .leaf_points = kLeafPoints};
+        options.simplified = fmt::format("{} {}", merging, rounding);  // names the trial
         Progress silent;
         const auto made = make_temporary_container(
             roomiest_temp_dir(options.run, target), [&](const std::filesystem::path& path) {
@@ -149,6 +159,7 @@ SimplificationChoice choose_simplification(const ContainerReader& container, dou
         progress.advance(container.superblock().points);
         return trial;
       });
+  if (earlier != container.meta().text.end()) choice.before = earlier->second;
   if (!choice.met) {
     progress.note(
         fmt::format("a tolerance of {:.3g} % is not met: the finest rounding is {:.3g} % off",

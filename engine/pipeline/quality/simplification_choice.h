@@ -43,12 +43,17 @@ struct SimplificationChoice {
   bool met = false;                         ///< false: no simplification that was tried meets it
   SimplificationTrial taken;                ///< the trial that was chosen
   std::vector<SimplificationTrial> trials;  ///< all of them, in their order
+  std::string before;                       ///< the text kSimplifiedKey of the container, if any
 
   /// Returns how points are stored.
   [[nodiscard]] Simplification simplification() const;
   /// Returns the text kSimplifiedKey.
   [[nodiscard]] std::string record() const;
 };
+
+/// Checks what choose_simplification() is asked.
+/// @throws RequestError when `asked` is not above 0 and at most 1, or the profile rounds no points
+void check_tolerance(double asked, Profile profile);
 
 /// Returns options with what was chosen.
 [[nodiscard]] RecodeOptions simplified(RecodeOptions options, const SimplificationChoice& choice);
