@@ -242,8 +242,8 @@ TEST_CASE("flat cells: what goes out stays in order, wherever a side begins and 
 }
 
 TEST_CASE("flat cells: no surfel comes before one that went out", "[build][merge]") {
-  // The 4,096 points that are read first end with one in a corner of a cell, which goes out at once.
-  // Two of the other side then fill two more corners, and their mean lies before that point
+  // The 4,096 points that are read first end with one in a corner of a cell, which goes out at
+  // once. Two of the other side then fill two more corners, and their mean lies before that point
   std::vector<Surfel> surfels;
   const Surfel up{.normal = {0, 0, 1}, .radius = 0.1F, .radiance = glm::vec3(1)};
   const auto add = [&](double x, double y, float radius, float side) {
