@@ -11,7 +11,8 @@
 //
 // Surfels that face to one side of a direction have a stack of their own, and those that face to
 // the other: so both sides of a sheet are merged. What goes out of the two is put into one order
-// again.
+// again, and waits for what may still come before it. That is not much, because cells that are wide
+// for their surfels are not merged.
 #include "engine/octree/flat_cells.h"
 
 #include <algorithm>
@@ -26,11 +27,8 @@
 #include <vector>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
-#include <glm/vec3.hpp>
 
-#include "engine/base/basis.h"
+#include "engine/octree/cluster_sums.h"
 #include "format/morton.h"
 #include "format/point_record.h"
 #include "format/scalar.h"
@@ -38,151 +36,9 @@
 namespace ptc {
 namespace {
 
-// The least reach of surfels from their mean, over the radius of a disc of their area. It is 1 in a
-// square and 0.88 in a hexagon; surfels that lie over each other reach less far.
-constexpr double kDensest = 0.9;
 // The greatest edge of a cell that is merged, in radii that its least surfel may grow to. A wall
 // takes a square of sqrt(2) of them, or somewhat more of a cell that it crosses at an angle.
 constexpr double kWidest = 4;
-
-/// Sums of a colour over surfels, by area.
-struct ColourSums {
-  glm::dvec3 first{0}, second{0};  ///< of the values, of their squares
-
-  void add(const glm::dvec3& value, double area) {
-    first += area * value;
-    second += area * value * value;
-  }
-  void add(const ColourSums& other) {
-    first += other.first;
-    second += other.second;
-  }
-  [[nodiscard]] double square() const { return second.x + second.y + second.z; }
-  /// Returns the sum of the squares by which the values differ from their mean.
-  [[nodiscard]] double change(double area) const {
-    return std::max(0.0, square() - glm::dot(first, first) / area);
-  }
-  /// Says whether the values deviate from their mean by at most `contrast` of its brightest
-  /// channel.
-  [[nodiscard]] bool is_even(double area, double contrast) const {
-    const glm::dvec3 mean = first / area, variance = second / area - mean * mean;
-    const double brightest = std::max({mean.x, mean.y, mean.z});
-    constexpr double kRounding = 1e-12;  // what it leaves of equal values
-    return std::max({variance.x, variance.y, variance.z}) <=
-           (contrast * contrast + kRounding) * brightest * brightest;
-  }
-};
-
-glm::dvec3 colour_of(const Half3& half) {
-  return {decode_half(half[0]), decode_half(half[1]), decode_half(half[2])};
-}
-
-Half3 to_halves(const glm::dvec3& colour) {
-  const glm::vec3 c(colour);
-  return {encode_half(c.x), encode_half(c.y), encode_half(c.z)};
-}
-
-/// Sums over surfels. Lengths are in lattice units.
-struct ClusterSums {
-  std::uint64_t count = 1;  ///< of the surfels
-  double area = 0;          ///< of all
-  glm::dvec3 mean{0};       ///< of their positions, by area
-  double reach = 0;         ///< greatest distance of their rims from the mean, at most
-  double least = 0;         ///< least of their radii
-  glm::dvec3 facing{0};     ///< sum of their normals, by area
-  glm::dmat3 spread{0};     ///< second moments about the mean of the squares that they stand for
-  ColourSums radiance, emission, albedo;
-
-  ClusterSums(const PointRecord& point, double unit)
-      : reach(double{point.radius} / unit), least(reach) {
-    area = 2 * reach * reach;
-    const LatticePoint at = decode_morton(point.key);
-    mean = {static_cast<double>(at[0]), static_cast<double>(at[1]), static_cast<double>(at[2])};
-    const auto n = decode_octahedral_f64(point.normal[0], point.normal[1]);
-    const glm::dvec3 normal(n[0], n[1], n[2]);
-    facing = area * normal;
-    spread = area * area / 12 * (glm::dmat3(1) - glm::outerProduct(normal, normal));
-    radiance.add(colour_of(point.radiance), area);
-    emission.add(colour_of(point.emission), area);
-    albedo.add({point.albedo[0], point.albedo[1], point.albedo[2]}, area);
-  }
-
-  /// Adds other surfels, but for the reach. @pre one of the areas is not 0
-  void add(const ClusterSums& other) {
-    const double sum = area + other.area;
-    const glm::dvec3 way = other.mean - mean;
-    spread += other.spread + area * other.area / sum * glm::outerProduct(way, way);
-    mean += other.area / sum * way;
-    facing += other.facing;
-    area = sum;
-    count += other.count;
-    least = std::min(least, other.least);
-    radiance.add(other.radiance);
-    emission.add(other.emission);
-    albedo.add(other.albedo);
-  }
-
-  /// Returns the area of the surfel that stands for them.
-  [[nodiscard]] double covered() const { return glm::length(facing); }
-  /// Returns their mean radius.
-  [[nodiscard]] double finest() const { return std::sqrt(area / static_cast<double>(count) / 2); }
-
-  /// Says whether they are as near to a flat and even surface, and as few, as is asked.
-  [[nodiscard]] bool is_flat(const Flatness& most) const {
-    const double one = covered();
-    if (!(1 - one / area <= most.turn * most.turn / 2)) return false;
-    if (std::sqrt(area / 2) > most.growth * finest()) return false;
-    const glm::dvec3 normal = facing / one;
-    const double height = most.height * finest();
-    return glm::dot(normal, spread * normal) <= height * height * area &&
-           radiance.is_even(area, most.contrast) && emission.is_even(area, most.contrast) &&
-           albedo.is_even(area, most.contrast);
-  }
-
-  /// Says whether the surfel that stands for them covers about what they cover.
-  [[nodiscard]] bool is_round(const Flatness& most) const {
-    const double radius = std::sqrt(covered() / 2);
-    return reach >= kDensest * radius && reach <= most.reach * radius;
-  }
-
-  /// Returns the surfel that stands for them.
-  /// @param like   one of them, which gives what is not summed
-  /// @param level  of the cell that they fill
-  [[nodiscard]] PointRecord surfel(PointRecord like, int level, double unit) const {
-    // The mean lies in the cell, but for what sums of doubles round
-    const LatticePoint low = decode_morton(cell_of(like.key, level));
-    const std::uint64_t last = (std::uint64_t{1} << (kLatticeBits - level)) - 1;
-    LatticePoint at;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double of_k = std::max(mean[static_cast<int>(k)], 0.0);
-      at[k] = std::clamp(static_cast<std::uint64_t>(of_k), low[k], low[k] + last);
-    }
-    like.key = encode_morton(at);
-    like.radius = static_cast<float>(std::sqrt(covered() / 2) * unit);
-    const glm::vec3 normal(facing / covered());
-    like.normal = encode_octahedral({normal.x, normal.y, normal.z});
-    like.radiance = to_halves(radiance.first / area);
-    like.emission = to_halves(emission.first / area);
-    for (int k = 0; k < 3; ++k) {
-      like.albedo[static_cast<std::size_t>(k)] =
-          static_cast<std::uint8_t>(std::lround(albedo.first[k] / area));
-    }
-    return like;
-  }
-
-  /// Returns what becomes of them. @param one  whether one surfel stands for all
-  [[nodiscard]] MergeCounts counts(bool one) const {
-    MergeCounts counts{.points = count,
-                       .light_square = radiance.square() + emission.square(),
-                       .albedo_square = albedo.square()};
-    if (!one) return counts;
-    counts.merged = count;
-    counts.made = 1;
-    counts.light_change = radiance.change(area) + emission.change(area);
-    counts.albedo_change = albedo.change(area);
-    return counts;
-  }
-};
 
 /// A surfel, or the surfels of a cell.
 struct Cluster {
