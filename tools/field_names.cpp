@@ -70,6 +70,7 @@ constexpr std::array kFields{
     FieldName{"sky", "--sky"},
     FieldName{"task_memory", "--task-memory"},
     FieldName{"texture.margin", "--margin"},
+    FieldName{"tolerance", "--tolerance"},
     FieldName{"tolerate_damage", "--tolerate-damage"},
     FieldName{"tree.leaf_points", "--leaf"},
     FieldName{"tree.levels_per_stream", "--levels-per-stream"},
