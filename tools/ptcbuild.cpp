@@ -256,16 +256,8 @@ ptc::Outcome build(Arguments& arguments, ptc::Command& command, ptc::Progress& p
     request.sampling.count = choice->taken.count;
     request.sampling.adapts = choice->taken.adapts;
   }
-  std::optional<ptc::SimplificationChoice> simplified;
-  ptc::BuildReport report;
-  if (arguments.tolerance) {
-    ptc::SimplifiedBuild made =
-        ptc::build_simplified(request, *arguments.tolerance, arguments.output, progress);
-    report = std::move(made.report);
-    simplified = std::move(made.choice);
-  } else {
-    report = ptc::build_container(request, arguments.output, progress);
-  }
+  auto [report, simplified] =
+      ptc::build_within(request, arguments.tolerance, arguments.output, progress);
   report.seconds.insert(report.seconds.begin(), choosing.begin(), choosing.end());
 
   // Report.

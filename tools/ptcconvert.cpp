@@ -79,16 +79,8 @@ Converted build(const Arguments& arguments, const ptc::RunOptions& run, ptc::Pro
   request.profile = arguments.profile;
   request.page_shift = arguments.page_shift;
   request.run = run;
-  ptc::BuildReport built;
-  std::optional<ptc::SimplificationChoice> choice;
-  if (arguments.tolerance) {
-    ptc::SimplifiedBuild made =
-        ptc::build_simplified(request, *arguments.tolerance, arguments.output, progress);
-    built = std::move(made.report);
-    choice = std::move(made.choice);
-  } else {
-    built = ptc::build_container(request, arguments.output, progress);
-  }
+  auto [built, choice] =
+      ptc::build_within(request, arguments.tolerance, arguments.output, progress);
   return {{.points = built.superblock.points,
            .superblock = built.superblock,
            .seconds = std::move(built.seconds)},

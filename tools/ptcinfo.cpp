@@ -281,7 +281,7 @@ std::string record_text(const ordered_json& record) {
   }
   if (const auto rounding = record.find(ptc::kRoundingKey); rounding != record.end()) {
     text += "  rounded   " +
-            (*rounding == ptc::kRounding
+            (*rounding == ptc::rounding_text()
                  ? "position by at most 0.001 of the point's radius, the radius by 1/512 of it, "
                    "normals by 0.0021 rad, radiance by 1/256 of it"
                  : quoted(*rounding)) +

@@ -183,8 +183,7 @@ class MergedStream : public PointStream {
         }
       }
       ended_ = count == 0;
-      collect();
-      handed_out_ = begin_of_open().value_or(block_[count > 0 ? count - 1 : 0].key);
+      collect(block_[count > 0 ? count - 1 : 0].key);
     }
     const std::size_t count = std::min(out.size(), ready_.size() - done_);
     std::copy_n(ready_.begin() + static_cast<std::ptrdiff_t>(done_), count, out.begin());
@@ -225,10 +224,12 @@ class MergedStream : public PointStream {
   }
 
   /// Moves what nothing can precede any more from both sides into ready_, in order.
-  void collect() {
+  /// @param last  key of the point that was taken last
+  void collect(const MortonKey& last) {
     ready_.clear();
     done_ = 0;
     const std::optional<MortonKey> until = begin_of_open();
+    handed_out_ = until.value_or(last);
     std::array<std::size_t, 2> count{};
     for (std::size_t i = 0; i < 2; ++i) {
       const auto& ready = sides_[i].ready;

@@ -45,13 +45,9 @@ inline constexpr double kRoundedNormal = 0.0021;
 /// that is more.
 inline constexpr double kRoundedRadiance = 1.0 / 256;
 
-/// The four bounds of the profiles in words, as the meta page of a rounded container records them.
-inline constexpr const char* kRounding =
-    "position 0.001 radius, radius 1/512, normal 0.0021, radiance 1/256";
-
-/// Returns the bounds of a rounding in words, for the meta page: kRounding for that of the
-/// profiles.
-[[nodiscard]] std::string rounding_text(const PointRounding& rounding);
+/// Returns the four bounds of a rounding in words, as the meta page of a rounded container records
+/// them.
+[[nodiscard]] std::string rounding_text(const PointRounding& rounding = {});
 
 /// Returns a stream of the same points, rounded. Their order stays. Rounding rounded points changes
 /// nothing. Points of radius 0 keep their position.

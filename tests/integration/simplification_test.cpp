@@ -138,11 +138,11 @@ TEST_CASE("simplification: a scene with flat walls takes far fewer bytes, and is
   BuildRequest request = box_request();
   Progress silent;
   const BuildReport usual = build_container(request, compact, silent);
-  const SimplifiedBuild made = build_simplified(request, 0.03, small, silent);
-  CHECK(made.choice.met);
-  CHECK(made.choice.taken.error() <= 0.03);
-  CHECK(made.choice.taken.merged.points == usual.superblock.points);
-  CHECK(made.report.superblock.points == made.choice.taken.points);
+  const SimplifiedBuild made = build_within(request, 0.03, small, silent);
+  CHECK(made.choice->met);
+  CHECK(made.choice->taken.error() <= 0.03);
+  CHECK(made.choice->taken.merged.points == usual.superblock.points);
+  CHECK(made.report.superblock.points == made.choice->taken.points);
   CHECK(made.report.superblock.points < usual.superblock.points / 4);
   CHECK(made.report.superblock.file_bytes < usual.superblock.file_bytes / 3);
   CHECK(made.report.superblock.area == Approx(usual.superblock.area).epsilon(0.01));
@@ -150,14 +150,15 @@ TEST_CASE("simplification: a scene with flat walls takes far fewer bytes, and is
 
   // It says what it is
   const ContainerReader scene(small);
-  CHECK(scene.meta().text.at(kSimplifiedKey) == made.choice.record());
-  CHECK(scene.meta().text.at(kRoundingKey) == rounding_text(made.choice.simplification().rounding));
+  CHECK(scene.meta().text.at(kSimplifiedKey) == made.choice->record());
+  CHECK(scene.meta().text.at(kRoundingKey) ==
+        rounding_text(made.choice->taken.simplification().rounding));
   CHECK(surfel_spacing(scene) == surfel_spacing(ContainerReader(compact)));
 
   // Neither threads nor the cap matter
   request.run.threads = 3;
   request.run.memory_bytes = 128 << 20;
-  static_cast<void>(build_simplified(request, 0.03, again, silent));
+  static_cast<void>(build_within(request, 0.03, again, silent));
   CHECK(bytes_of(again) == bytes_of(small));
 
   // A second tolerance hides nothing of the first
@@ -173,9 +174,9 @@ TEST_CASE("simplification: a scene with flat walls takes far fewer bytes, and is
 
   // The finer, the more is kept
   request.run = {};
-  const SimplifiedBuild finer = build_simplified(request, 0.005, again, silent);
+  const SimplifiedBuild finer = build_within(request, 0.005, again, silent);
   CHECK(finer.report.superblock.points > made.report.superblock.points);
-  CHECK(finer.choice.taken.error() <= 0.005);
+  CHECK(finer.choice->taken.error() <= 0.005);
 }
 
 TEST_CASE("simplification: points with channels are rounded and none is lost",
@@ -212,11 +213,11 @@ TEST_CASE("simplification: what contradicts itself is refused", "[integration][e
   Progress silent;
   BuildRequest request = box_request();
   request.profile = Profile::exact;
-  CHECK_THROWS_AS(build_simplified(request, 0.03, target, silent), RequestError);
+  CHECK_THROWS_AS(build_within(request, 0.03, target, silent), RequestError);
   request.profile = Profile::compact;
-  CHECK_THROWS_AS(build_simplified(request, 0, target, silent), RequestError);
-  CHECK_THROWS_AS(build_simplified(request, 1.5, target, silent), RequestError);
+  CHECK_THROWS_AS(build_within(request, 0, target, silent), RequestError);
+  CHECK_THROWS_AS(build_within(request, 1.5, target, silent), RequestError);
   request.resume = true;
-  CHECK_THROWS_AS(build_simplified(request, 0.03, target, silent), RequestError);
+  CHECK_THROWS_AS(build_within(request, 0.03, target, silent), RequestError);
   CHECK_FALSE(std::filesystem::exists(target));
 }

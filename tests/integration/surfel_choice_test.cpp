@@ -59,7 +59,7 @@ SurfelChoice choose(const BuildRequest& request, double asked, const std::filesy
 
 TEST_CASE("surfel choice: errors of which both sides come from rays leave their noise out",
           "[integration][error]") {
-  // Both sides of each comparison have the same noise. Occlusion is off by 0.1, light by 0.2
+  // What is ours has the noise of the truth, and is off by 0.1 of occlusion and by 0.2 of light
   std::vector<ErrorSums> parts(400);
   for (std::size_t i = 0; i < parts.size(); ++i) {
     const float a = 0.3F * std::sin(static_cast<float>(i)),

@@ -36,7 +36,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   if (inputs.clouds.unlit && !inputs.has_meshes()) meta.text[kSkyLightKey] = "gathered";
   const bool assumed = inputs.clouds.points > 0 && !inputs.clouds.coloured && !inputs.has_meshes();
   if (assumed) meta.text[kAlbedoKey] = kAssumed;
-  if (is_rounded(request.profile)) meta.text[kRoundingKey] = kRounding;
+  if (is_rounded(request.profile)) meta.text[kRoundingKey] = rounding_text();
   if (request.sampling.camera) meta.text[kCameraKey] = to_json(*request.sampling.camera);
   return meta;
 }

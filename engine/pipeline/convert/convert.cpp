@@ -140,7 +140,8 @@ Superblock write_container(const ContainerReader& container, const std::filesyst
     if (meta.text.contains(kSimplifiedKey)) text += "; before: " + meta.text[kRoundingKey];
     meta.text[kRoundingKey] = text;
     meta.text[kSimplifiedKey] = options.simplified;
-  } else if (is_rounded(options.profile) && meta.text.try_emplace(kRoundingKey, kRounding).second) {
+  } else if (is_rounded(options.profile) &&
+             meta.text.try_emplace(kRoundingKey, rounding_text()).second) {
     rounding.emplace();
   }
   check_meta(meta, page_shift, from.point_bytes);

@@ -1,16 +1,13 @@
 #include "engine/pipeline/quality/point_error.h"
 
-#include <algorithm>
-#include <span>
-
 #include "engine/base/memory_budget.h"
 #include "engine/base/progress.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/lighting.h"
+#include "engine/pipeline/quality/disc_pairs.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/receivers.h"
 #include "engine/shade/lift.h"
-#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 namespace {
@@ -36,25 +33,12 @@ std::vector<Shading> PointJudge::trace(const ContainerReader& scene) const {
   charge_directory(budget, exact_);
   if (&scene != &exact_) charge_directory(budget, scene);
   charge_sky(budget, lights.sky);
-  const std::uint64_t least =
-      RayShader::least_bytes(scene, executor_.threads(), RayOptions{}.back_end);
-  RayShader discs(scene,
-                  {.sky = [&](const glm::vec3& way) { return lights.sky.at(way); },
-                   .emission = !lit_by_emitters(scene),
-                   .memory_bytes = budget.rest("the page cache", least)},
-                  executor_);
-  const std::vector<Receiver> twice = two_of_each(receivers_);
-  std::vector<Shading> traced(twice.size());
-  discs.trace(twice, kRays, kSeed, traced, silent);
-  return traced;
+  return trace_pairs(scene, lights.sky, receivers_, {.rays = kRays, .seed = kSeed}, budget,
+                     executor_);
 }
 
 BoundedError PointJudge::measure(const ContainerReader& other) {
-  const std::vector<Shading> traced = trace(other);
-  std::vector<ErrorSums> errors(receivers_.size());
-  for (std::size_t i = 0; i < errors.size(); ++i)
-    errors[i].add(traced[2 * i], truth_[2 * i], traced[2 * i + 1], truth_[2 * i + 1]);
-  return bounded_error(errors);
+  return error_of_pairs(trace(other), truth_);
 }
 
 }  // namespace ptc

@@ -43,9 +43,9 @@ double SimplificationTrial::error() const noexcept {
   return std::max({found.high, light_error, albedo_error});
 }
 
-Simplification SimplificationChoice::simplification() const {
-  return {.merging = merging_of(taken.merging),
-          .rounding = rounding_of(taken.rounding),
+Simplification SimplificationTrial::simplification() const {
+  return {.merging = merging_of(merging),
+          .rounding = rounding_of(rounding),
           .leaf_points = kLeafPoints};
 }
 
@@ -71,7 +71,7 @@ std::string SimplificationChoice::record() const {
 }
 
 RecodeOptions simplified(RecodeOptions options, const SimplificationChoice& choice) {
-  options.simplification = choice.simplification();
+  options.simplification = choice.taken.simplification();
   options.simplified = choice.record();
   return options;
 }
@@ -140,9 +140,7 @@ SimplificationChoice choose_simplification(const ContainerReader& container, dou
   SimplificationChoice choice =
       search_simplification(asked, merges, [&](double merging, double rounding) {
         SimplificationTrial trial{.merging = merging, .rounding = rounding};
-        options.simplification = Simplification{.merging = merging_of(merging),
-                                                .rounding = rounding_of(rounding),
-                                                .leaf_points = kLeafPoints};
+        options.simplification = trial.simplification();
         options.simplified = fmt::format("{} {}", merging, rounding);  // names the trial
         Progress silent;
         const auto made = make_temporary_container(
@@ -168,12 +166,13 @@ SimplificationChoice choose_simplification(const ContainerReader& container, dou
   return choice;
 }
 
-SimplifiedBuild build_simplified(BuildRequest request, double asked,
-                                 const std::filesystem::path& target, Progress& progress) {
+SimplifiedBuild build_within(BuildRequest request, std::optional<double> asked,
+                             const std::filesystem::path& target, Progress& progress) {
+  if (!asked) return {.report = build_container(request, target, progress)};
   require_request(!request.resume && request.append.empty(), kSubject,
                   "`tolerance` excludes `resume` and `append`: build the container first, and "
                   "simplify it then");
-  check_tolerance(asked, request.profile);
+  check_tolerance(*asked, request.profile);
   const RecodeOptions options{
       .profile = request.profile, .page_shift = request.page_shift, .run = request.run};
   request.profile = Profile::exact;
@@ -184,9 +183,9 @@ SimplifiedBuild build_simplified(BuildRequest request, double asked,
       });
   return_freed_memory();
   made.choice =
-      choose_simplification(*exact, asked, options, target, made.report.seconds, progress);
+      choose_simplification(*exact, *asked, options, target, made.report.seconds, progress);
   const ConvertReport written =
-      recode_container(*exact, target, simplified(options, made.choice), progress);
+      recode_container(*exact, target, simplified(options, *made.choice), progress);
   made.report.superblock = *written.superblock;
   made.report.seconds.insert(made.report.seconds.end(), written.seconds.begin(),
                              written.seconds.end());

@@ -2,14 +2,14 @@
 // (spec/shading.md#simplification).
 //
 //   rounding       coarsest of four whose error is small beside what is asked
-//   merging        2 -> 2.8 -> 4      more, while the error is below what is asked; less, while
-//   above
+//   merging        2 -> 2.8 -> 4      more, while the error is below what is asked, or less
 //                       3.4 <-        the geometric middle of the last two
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,6 +33,8 @@ struct SimplificationTrial {
   double light_error = 0;    ///< root mean square, relative, of what leaves them
   double albedo_error = 0;   ///< the same of their albedo
 
+  /// Returns how points are stored.
+  [[nodiscard]] Simplification simplification() const;
   /// Returns the greatest of the errors, that of arriving light by its upper bound.
   [[nodiscard]] double error() const noexcept;
 };
@@ -45,8 +47,6 @@ struct SimplificationChoice {
   std::vector<SimplificationTrial> trials;  ///< all of them, in their order
   std::string before;                       ///< the text kSimplifiedKey of the container, if any
 
-  /// Returns how points are stored.
-  [[nodiscard]] Simplification simplification() const;
   /// Returns the text kSimplifiedKey.
   [[nodiscard]] std::string record() const;
 };
@@ -81,19 +81,19 @@ void check_tolerance(double asked, Profile profile);
                                                          const std::filesystem::path& target,
                                                          StageSeconds& seconds, Progress& progress);
 
-/// A container that was built and simplified.
+/// A container that was built, and simplified if that was asked for.
 struct SimplifiedBuild {
-  BuildReport report;  ///< of the build; `superblock` is that of the simplified container
-  SimplificationChoice choice;
+  BuildReport report;  ///< of the build; `superblock` is that of the container that was published
+  std::optional<SimplificationChoice> choice;
 };
 
-/// Builds a container, which goes into a temporary one first, and writes it as
+/// Builds a container. With a tolerance it goes into a temporary one first, and is written as
 /// choose_simplification() says.
+/// @param asked  as for choose_simplification(); empty: build_container() alone
 /// @throws RequestError when it is to be resumed or appended to another one; as build_container()
 ///         and choose_simplification()
 /// Memory: at most RunOptions::memory_bytes.
-[[nodiscard]] SimplifiedBuild build_simplified(BuildRequest request, double asked,
-                                               const std::filesystem::path& target,
-                                               Progress& progress);
+[[nodiscard]] SimplifiedBuild build_within(BuildRequest request, std::optional<double> asked,
+                                           const std::filesystem::path& target, Progress& progress);
 
 }  // namespace ptc

@@ -12,6 +12,7 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/light/lighting.h"
+#include "engine/pipeline/quality/disc_pairs.h"
 #include "engine/pipeline/render/clearance.h"
 #include "engine/pipeline/render/tile_renderer.h"
 #include "engine/pipeline/scene_record.h"
@@ -21,7 +22,6 @@
 #include "engine/scene/sampling/places_by_area.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/reference/cosine_rays.h"
-#include "engine/trace/ray_shader.h"
 
 namespace ptc {
 namespace {
@@ -156,20 +156,9 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene) {
   return_freed_memory();
 
   // Trace the same rays at the surfels
-  const std::uint64_t least =
-      RayShader::least_bytes(scene, executor_.threads(), RayOptions{}.back_end);
-  RayShader discs(scene,
-                  {.sky = [&](const glm::vec3& way) { return lights.sky.at(way); },
-                   .emission = !by_emitters,
-                   .memory_bytes = left.rest("the page cache", least)},
-                  executor_);
-  const std::vector<Receiver> twice = two_of_each(receivers);
-  std::vector<Shading> traced(twice.size());
-  discs.trace(twice, kRays, kSeed, traced, silent);
-  std::vector<ErrorSums> errors(receivers.size());
-  for (std::size_t i = 0; i < receivers.size(); ++i)
-    errors[i].add(traced[2 * i], truth_[2 * i], traced[2 * i + 1], truth_[2 * i + 1]);
-  return bounded_error(errors);
+  return error_of_pairs(
+      trace_pairs(scene, lights.sky, receivers, {.rays = kRays, .seed = kSeed}, left, executor_),
+      truth_);
 }
 
 }  // namespace ptc
