@@ -59,7 +59,7 @@ def packages_not_linked(root_list, other_lists):
     """Returns packages that the CMakeLists.txt at the root requires and that no target links."""
     required = re.findall(r"^\s*find_package\((\w+) [^)]*\bCONFIG\b", root_list, re.MULTILINE)
     required += re.findall(r"^\s*pkg_check_modules\((\w+)", root_list, re.MULTILINE)
-    words = set(re.split(r"[\s():]+", " ".join(other_lists)))
+    words = set(re.split(r"[\s():,<>$]+", " ".join(other_lists)))
     return [name for name in required if name not in words]
 
 

@@ -26,6 +26,7 @@
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/io/file/file.h"
+#include "engine/io/file/url.h"
 #include "format/error.h"
 #include "format/text.h"
 #include "tools/completion.h"
@@ -43,6 +44,7 @@ void check_output(const std::filesystem::path& path) {
   const auto refuse = [&](std::errc code) {
     throw std::system_error(std::make_error_code(code), "open " + path.string());
   };
+  if (is_url(path)) refuse(std::errc::read_only_file_system);
   const std::filesystem::path parent = path.parent_path();
   if (!parent.empty() && !std::filesystem::exists(parent)) {
     refuse(std::errc::no_such_file_or_directory);
@@ -223,13 +225,14 @@ void check_input(const std::filesystem::path& path) {
         code == std::errc::too_many_files_open_in_system || code == std::errc::io_error) {
       throw;
     }
+    if (is_net_failure(path, error)) throw;
     const bool pipe = code == std::errc::invalid_seek;
     throw DataError(path.string() + ": " + (pipe ? "Is not a regular file" : code.message()));
   }
 }
 
 bool has_ending(const std::filesystem::path& path, const std::string& ending) {
-  std::string name = path.filename().string();
+  std::string name = file_name(path);
   std::ranges::transform(name, name.begin(), [](unsigned char c) { return std::tolower(c); });
   return name.size() > ending.size() && name.ends_with(ending);
 }

@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/file/url.h"
 #include "engine/io/text/byte_stream.h"
 #include "engine/io/text/text.h"
 #include "engine/pipeline/build/scene_file.h"
@@ -26,7 +27,8 @@ namespace ptc {
 namespace {
 
 bool is_pattern(const std::string& name) {
-  return name.find_first_of("*?[") != std::string::npos && !std::filesystem::exists(name);
+  return !is_url(name) && name.find_first_of("*?[") != std::string::npos &&
+         !std::filesystem::exists(name);
 }
 
 /// Says whether the name of a file ends as those of meshes and clouds do.
@@ -60,7 +62,7 @@ void InputFiles::add(const std::filesystem::path& path) {
   check_input(path);
   paths_.push_back(path);
   if (!names_.empty()) names_ += ' ';
-  names_ += printable(path.filename().string());
+  names_ += printable(file_name(path));
 }
 
 void InputFiles::add_directory(const std::filesystem::path& directory) {
@@ -97,7 +99,7 @@ void InputFiles::add_list(const std::filesystem::path& list) {
     const std::string_view name = Words(line).rest();
     if (name.empty() || name.front() == '#') continue;
     // Names are relative to the list, so that it can be used from anywhere
-    add(list.parent_path() / std::filesystem::path(name));
+    add(is_url(name) ? std::filesystem::path(name) : list.parent_path() / name);
   }
   if (paths_.empty()) throw DataError(list.string() + ": the list names no file");
 }
@@ -142,7 +144,7 @@ bool is_build_input(const std::filesystem::path& path) {
 }
 
 std::string build_command(const std::filesystem::path& input) {
-  std::filesystem::path name = input.filename();
+  std::filesystem::path name = file_name(input);
   if (has_ending(name, ".gz")) name = name.stem();
   return fmt::format("ptcbuild {} -o {}", input.string(), name.replace_extension(".ptcx").string());
 }

@@ -20,6 +20,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/file/file.h"
+#include "engine/io/file/remote_file.h"
 #include "engine/octree/rounding.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
@@ -184,6 +185,7 @@ void require_memory(const std::filesystem::path& path, const ptc::RunOptions& ru
   const std::uint64_t texts = kTexts << superblock.header.page_shift;
   ptc::MemoryBudget budget(run.memory_bytes, "this file");
   budget.charge("its record", texts);
+  if (file.is_remote()) budget.charge(ptc::RemoteFile::kMemory, ptc::RemoteFile::kMemoryBytes);
   budget.charge("its directory", ptc::ContainerReader::kMaxPageBytes * superblock.page_count);
   budget.require();
 }
@@ -363,7 +365,7 @@ ordered_json cloud_facts(const std::filesystem::path& path, const ptc::PointFile
     facts["bounds"] = {{"low", corner(info.stated_bounds->low)},
                        {"high", corner(info.stated_bounds->high)}};
   }
-  facts["bytes"] = {{"file", std::filesystem::file_size(path)}};
+  facts["bytes"] = {{"file", ptc::InputFile(path).size()}};
   facts["normals"] = info.has_normals;
   facts["radii"] = info.has_radius;
   facts["radiance"] = info.has_radiance;

@@ -26,6 +26,7 @@
 #include <glm/trigonometric.hpp>
 
 #include "engine/base/numbers.h"
+#include "engine/io/file/url.h"
 #include "engine/io/image/texture.h"
 #include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/point_input.h"
@@ -315,7 +316,7 @@ void note_unknown_up(const std::vector<std::filesystem::path>& files, const std:
   const auto silent = std::ranges::find_if(
       all, [](const auto& file) { return holds_points(file) && !is_container(file); });
   if (silent == all.end() || !text_with_up(files).empty()) return;
-  progress.note(silent->filename().string() +
+  progress.note(file_name(*silent) +
                 ": the file does not say which axis is up, y is taken; --up z if it is z");
 }
 

@@ -110,6 +110,10 @@ DirectDescriptor::~DirectDescriptor() {
 
 std::unique_ptr<PageSource> make_page_source(BackEnd back_end, const InputFile& file,
                                              std::size_t max_bytes) {
+  if (file.is_remote() && back_end != BackEnd::pread) {
+    throw std::system_error(EOPNOTSUPP, std::generic_category(),
+                            "read past the page cache " + file.path().string());
+  }
   switch (back_end) {
     case BackEnd::mmap:
       return std::make_unique<MmapSource>(file);

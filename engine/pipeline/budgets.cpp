@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/file/remote_file.h"
+#include "engine/io/file/url.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/scene/sampling/mesh_parts.h"
@@ -46,7 +48,7 @@ const std::filesystem::path& with_directory_under(const std::filesystem::path& s
   const InputFile file(scene);
   const Superblock superblock = read_superblock(file, read_file_header(file));
   MemoryBudget budget(run.memory_bytes, "this scene");
-  budget.charge("the directory of " + scene.filename().string(),
+  budget.charge("the directory of " + file_name(scene),
                 ContainerReader::kMaxPageBytes * superblock.page_count);
   budget.require();
   return scene;
@@ -54,8 +56,9 @@ const std::filesystem::path& with_directory_under(const std::filesystem::path& s
 
 void charge_directory(MemoryBudget& budget, const ContainerReader& container) {
   budget.charge(
-      "the directory of " + container.path().filename().string(),
+      "the directory of " + file_name(container.path()),
       ContainerReader::kPageBytes * container.page_count() * (container.parts().empty() ? 1 : 2));
+  if (container.file().is_remote()) budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
 }
 
 void charge_textures(MemoryBudget& budget, const std::vector<Material>& materials) {

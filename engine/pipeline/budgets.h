@@ -49,7 +49,8 @@ struct ThreadsThatFit {
 [[nodiscard]] const std::filesystem::path& with_directory_under(const std::filesystem::path& scene,
                                                                 const RunOptions& run);
 
-/// Charges the directory that an open container keeps in memory.
+/// Charges the directory that an open container keeps in memory, and what it takes to read one from
+/// a server.
 void charge_directory(MemoryBudget& budget, const ContainerReader& container);
 
 /// Charges the textures of materials.

@@ -9,6 +9,7 @@
 #include <string>
 #include <system_error>
 
+#include "engine/io/file/url.h"
 #include "engine/store/commit.h"
 #include "engine/store/reader.h"
 #include "format/error.h"
@@ -111,7 +112,7 @@ PartList ContainerReader::read_parts() const {
 }
 
 void ContainerReader::open_part(const PartRecord& record) {
-  const std::filesystem::path name = path().parent_path() / record.name;
+  const std::filesystem::path name = file_beside(path(), record.name);
   const auto refuse = [&](const std::string& what) {
     throw FormatError(0, kFile, "is not the part that " + path().string() + " names: " + what)
         .rebased(0, name.string());
@@ -121,7 +122,7 @@ void ContainerReader::open_part(const PartRecord& record) {
     if (read_file_header(InputFile(name)).has_parts()) refuse("it is a scene of parts itself");
     parts_.push_back(std::make_unique<const ContainerReader>(name));
   } catch (const std::system_error& error) {
-    if (std::filesystem::is_regular_file(name)) throw;
+    if (is_file(name)) throw;
     refuse("there is no such file");
   }
   const ContainerReader& part = *parts_.back();

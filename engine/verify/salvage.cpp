@@ -23,6 +23,8 @@
 
 #include "engine/base/error.h"
 #include "engine/base/memory_budget.h"
+#include "engine/io/file/remote_file.h"
+#include "engine/io/file/url.h"
 #include "engine/octree/build_pages.h"
 #include "engine/octree/channel_pager.h"
 #include "engine/parallel/thread_pool.h"
@@ -297,8 +299,8 @@ class Salvage {
       return;
     }
     pages_before_ += (record.points - 1) / points_per_page(header()) + 1;
-    const std::filesystem::path path = file_.path().parent_path() / record.name;
-    if (!std::filesystem::is_regular_file(path)) return;
+    const std::filesystem::path path = file_beside(file_.path(), record.name);
+    if (!is_file(path)) return;
     require_other_file(path, target);
     auto part = std::make_unique<Remains>(path, flips_, progress_);
     const std::optional<FileHeader>& found = part->survey().header;
@@ -317,6 +319,7 @@ class Salvage {
       pages += source->survey().sites.size() + source->survey().void_pages.size();
     MemoryBudget budget(options_.memory_bytes, "the salvage of this file", "memory_bytes");
     budget.charge("the program", kBaseBytes);
+    if (file_.file().is_remote()) budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
     budget.charge("the list of pages", kPageBytes * pages);
     budget.charge("open pages", kPagesOpen << header().page_shift);
     budget.charge("node pages that wait", held_pages_bytes(header().page_shift));

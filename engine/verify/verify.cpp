@@ -22,6 +22,8 @@
 #include <utility>
 
 #include "engine/base/memory_budget.h"
+#include "engine/io/file/remote_file.h"
+#include "engine/io/file/url.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/store/commit.h"
 #include "engine/verify/checked_pages.h"
@@ -100,6 +102,7 @@ class FileCheck {
         survey_.container ? s.node_groups : 0;  // a superblock alone proves no number of groups
     MemoryBudget budget(options_.memory_bytes, "this file", "memory_bytes");
     budget.charge("the program", kBaseBytes);
+    if (file_.is_remote()) budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
     budget.charge("the list of pages", 110 * survey_.sites.size());
     budget.charge("groups of nodes", groups / 8);
     budget.charge("threads", 3 * page * executor_.threads());
@@ -216,7 +219,7 @@ class FileCheck {
 
   /// Says whether a file can be checked as a part: it is a file, and no scene of parts.
   static bool is_part(const std::filesystem::path& file) {
-    if (!std::filesystem::is_regular_file(file)) return false;
+    if (!is_file(file)) return false;
     try {
       return !read_file_header(InputFile(file)).has_parts();
     } catch (const FormatError&) {  // its own check reports it
@@ -287,7 +290,7 @@ class FileCheck {
     try {
       const PartList list = survey_.container->read_parts();
       for (const PartRecord& part : list.parts()) {
-        const std::filesystem::path file = file_.path().parent_path() / part.name;
+        const std::filesystem::path file = file_beside(file_.path(), part.name);
         if (!is_part(file)) continue;  // opening the scene reports it
         VerifyReport found = FileCheck(file, options_).run(progress);
         add_part(file, found);

@@ -15,6 +15,7 @@ import unittest
 from pathlib import Path
 
 from programs import BIN, BOX, PROGRAMS, ball, write_ply
+from range_server import RangeServer
 
 ROOT = Path(__file__).resolve().parents[2]
 GUIDE = ROOT / "spec" / "guide"
@@ -141,6 +142,15 @@ class GuideTest(unittest.TestCase):
         self.assertGreater(self.run_page(text, mesh="statue.ply"), 9)
 
 
+    def test_remote(self):
+        """The page has its scene on a server, which is one of this machine here."""
+        made = subprocess.run([BIN / "ptcbuild", "--city", "20k", "-o", self.here / "city.ptcx", "--quiet"], timeout=120)
+        self.assertEqual(made.returncode, 0)
+        with RangeServer(self.here) as server:
+            page = (GUIDE / "remote.md").read_text()
+            self.assertGreater(self.run_page(page, server=server.url, no_proxy="127.0.0.1"), 3)
+
+
 def add_page(page):
     @unittest.skipIf(page.stem == "measure" and "ptcbench" not in PROGRAMS, "without ptcbench")
     def test(self):
@@ -150,7 +160,7 @@ def add_page(page):
 
 
 for found in sorted(GUIDE.glob("*.md")):
-    if found.name != "README.md":
+    if found.name not in ("README.md", "remote.md"):
         add_page(found)
 
 if __name__ == "__main__":

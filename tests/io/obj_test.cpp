@@ -319,14 +319,14 @@ TEST_CASE("textures: pictures with more pixels than their files justify are left
   const std::uint64_t bytes = pictures[0].size();
   REQUIRE(256 * bytes > 10'000);  // so that the bytes of one more justify its pixels, as in a file
   MeshWarnings warnings;
-  TextureLoader loader(scratch.path(), warnings, nullptr, 0);
+  TextureLoader loader(scratch / "a.obj", warnings, nullptr, 0);
   for (const char* name : {"a.png", "./a.png", "b.png", "c.png"}) CHECK(loader.load(name));
   CHECK(warnings.lines().empty());
 
   const auto decode = [&](TextureLoader& from, const std::string& name) {
     return from.decode(name, ByteRange(std::as_bytes(std::span(pictures[0]))), 0);
   };
-  TextureLoader poor(scratch.path(), warnings, nullptr, 25'000);
+  TextureLoader poor(scratch / "a.obj", warnings, nullptr, 25'000);
   CHECK(decode(poor, "image 0"));
   CHECK(decode(poor, "image 1"));
   CHECK_FALSE(decode(poor, "image 2"));

@@ -54,6 +54,7 @@ class Debian(unittest.TestCase):
         self.assertIn("libembree", depends("libptc"))
         self.assertIn("libptc (=", depends("libptc-dev"))
         self.assertNotIn("cairo", depends("libptc"))
+        self.assertEqual(run("dpkg-deb", "--field", self.packages["libptc"], "Recommends").strip(), "libcurl4")
 
     @unittest.skipUnless(shutil.which("lintian"), "lintian is not installed")
     def test_lintian_has_no_errors(self):

@@ -151,6 +151,7 @@ endforeach()
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_DEPENDS "libptc (= ${PROJECT_VERSION}), libglm-dev")
 set(CPACK_DEBIAN_LIBPTC-DEV_PACKAGE_SUGGESTS
   "libzstd-dev, liblz4-dev, libxxhash-dev, libopenexr-dev, libtbb-dev, libembree-dev, libfmt-dev, libhwy-dev, liburing-dev, libpugixml-dev, libdraco-dev, libmeshoptimizer-dev, libjpeg-dev, libpng-dev, zlib1g-dev")
+set(CPACK_DEBIAN_LIBPTC_PACKAGE_RECOMMENDS libcurl4)  # loaded when a URL is opened
 set(CPACK_DEBIAN_LIBPTC_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/tools/install/triggers)
 set(CPACK_PACKAGE_NAME ptcx)
 set(CPACK_PACKAGE_CONTACT "The PTCX authors <ptcx@users.noreply.github.com>")

@@ -33,7 +33,9 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/file/remote_file.h"
 #include "engine/io/file/temporary_name.h"
+#include "engine/io/file/url.h"
 
 namespace ptc {
 namespace {
@@ -165,6 +167,7 @@ void unlink_and_reraise(int signal) {
 // Returns the permissions of the file that will be replaced, or nothing when there is none. It
 // throws std::system_error when the target is not a regular file or cannot be one.
 std::optional<mode_t> mode_of(const std::filesystem::path& target) {
+  if (is_url(target)) fail(EROFS, "open", target);
   struct stat old {};
   const bool exists = ::stat(target.c_str(), &old) == 0;
   if (!exists && errno != ENOENT) fail(errno, "stat", target);
@@ -212,6 +215,11 @@ void discard_blocks(int fd, std::uint64_t offset, std::uint64_t bytes) noexcept 
 }
 
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
+  if (is_url(path)) {
+    remote_ = std::make_unique<RemoteFile>(path.string());
+    size_ = remote_->size();
+    return;
+  }
   // Open without blocking, because opening a pipe would wait for its writer.
   fd_ = open_retrying(path, O_RDONLY | O_NONBLOCK);
   if (fd_ < 0) fail(errno, "open", path);
@@ -233,9 +241,11 @@ InputFile::~InputFile() {
 InputFile::InputFile(InputFile&& other) noexcept
     : path_(std::move(other.path_)),
       fd_(std::exchange(other.fd_, -1)),
-      size_(std::exchange(other.size_, 0)) {}
+      size_(std::exchange(other.size_, 0)),
+      remote_(std::move(other.remote_)) {}
 
 bool InputFile::is_named(const std::filesystem::path& path) const {
+  if (is_remote()) return false;
   struct stat own {
   }, named{};
   if (::fstat(fd_, &own) != 0) fail(errno, "fstat", path_);
@@ -244,10 +254,15 @@ bool InputFile::is_named(const std::filesystem::path& path) const {
 }
 
 void InputFile::read_at(std::uint64_t offset, std::span<std::byte> out) const {
-  read_whole(fd_, path_, offset, out);
+  if (is_remote()) {
+    remote_->read_at(offset, out);
+  } else {
+    read_whole(fd_, path_, offset, out);
+  }
 }
 
 void InputFile::read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept {
+  if (is_remote()) return;
   ::posix_fadvise(fd_, static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
 }
 
@@ -262,6 +277,25 @@ std::filesystem::path behind_links(const std::filesystem::path& path) {
     end = end.parent_path() / std::filesystem::read_symlink(end);
   }
   fail(ELOOP, "readlink", path);
+}
+
+bool is_file(const std::filesystem::path& path) {
+  std::error_code unknown;
+  if (!is_url(path)) return std::filesystem::is_regular_file(path, unknown);
+  try {
+    static_cast<void>(RemoteFile(path.string()));
+    return true;
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::no_such_file_or_directory) return false;
+    throw;
+  }
+}
+
+bool is_net_failure(const std::filesystem::path& path, const std::exception& error) {
+  const auto* const failure = dynamic_cast<const std::system_error*>(&error);
+  return is_url(path) && failure != nullptr &&
+         failure->code() != std::errc::no_such_file_or_directory &&
+         failure->code() != std::errc::permission_denied;
 }
 
 bool same_name(const std::filesystem::path& a, const std::filesystem::path& b) {

@@ -18,17 +18,21 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <filesystem>
+#include <memory>
 #include <span>
 
 namespace ptc {
 
+class RemoteFile;
+
 /// A file that is open for reading.   Threads: read_at() may be called concurrently.
 class InputFile {
  public:
-  /// Opens a regular file.
+  /// Opens a regular file, or a file on a server by its URL (remote_file.h).
   /// @throws std::system_error that names the call and the path; a directory is refused with
-  ///         EISDIR, and anything else that is not a regular file with ESPIPE
+  ///         EISDIR, and anything else that is not a regular file with ESPIPE; RemoteFile's errors
   explicit InputFile(const std::filesystem::path& path);
   ~InputFile();
   InputFile(InputFile&& other) noexcept;
@@ -38,22 +42,28 @@ class InputFile {
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
   /// Returns the length of the file in bytes, as it was when the file was opened.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
-  /// Returns the descriptor, which this object owns and closes.
+  /// Says whether the file is read from a server.
+  [[nodiscard]] bool is_remote() const noexcept { return remote_ != nullptr; }
+  /// Returns the descriptor, which this object owns and closes; -1 for a remote file.
   [[nodiscard]] int descriptor() const noexcept { return fd_; }
-  /// Says whether a path names this file, and not one that has replaced it.
+  /// Says whether a path names this file, and not one that has replaced it. No path names a remote
+  /// file.
   /// @throws std::system_error
   [[nodiscard]] bool is_named(const std::filesystem::path& path) const;
   /// Fills `out` with the bytes of the file from `offset` on.
-  /// @throws DataError when the file ends before `out` is full; std::system_error when a read fails
+  /// @throws DataError when the file ends before `out` is full; std::system_error when a read
+  /// fails;
+  ///         RemoteFile's errors
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
   /// Asks the system to begin reading these bytes into its page cache, because they will be read
-  /// soon.
+  /// soon. It does nothing for a remote file.
   void read_ahead(std::uint64_t offset, std::uint64_t bytes) const noexcept;
 
  private:
   std::filesystem::path path_;
   int fd_ = -1;
   std::uint64_t size_ = 0;
+  std::unique_ptr<const RemoteFile> remote_;
 };
 
 /// A file that is written under a temporary name (temporary_name()) and either replaces the target
@@ -64,8 +74,8 @@ class InputFile {
 class OutputFile {
  public:
   /// Creates the temporary file. A symbolic link is followed, also to a file that does not exist.
-  /// @throws std::system_error; a target that is a directory is refused with EISDIR, any other
-  ///         target that is not a regular file with EINVAL
+  /// @throws std::system_error; a target that is a directory is refused with EISDIR, a URL with
+  ///         EROFS, any other target that is not a regular file with EINVAL
   explicit OutputFile(const std::filesystem::path& target);
   /// Opens or creates the file `partial` in place of a temporary one. What it already holds is
   /// kept, and the file stays when this object is destroyed without publish().
@@ -132,6 +142,15 @@ class TemporaryName {
 /// Returns the path at the end of a chain of symbolic links, where a file need not exist.
 /// @throws std::system_error (ELOOP) for links that lead in a circle
 [[nodiscard]] std::filesystem::path behind_links(const std::filesystem::path& path);
+
+/// Says whether a path leads to a regular file that can be looked at, or a URL to a file on a
+/// server.
+/// @throws the errors of RemoteFile, but for a file that is not there (ENOENT)
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
+
+/// Says whether an error is that of a server or of the net, and not that the file of a URL is not
+/// there or not to be read.
+[[nodiscard]] bool is_net_failure(const std::filesystem::path& path, const std::exception& error);
 
 /// Says whether two paths lead to one name of a file, which need not exist. What the name stands
 /// for does not count, so the answer stays the same while other programs replace the file.

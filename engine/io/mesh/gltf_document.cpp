@@ -22,6 +22,7 @@
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/file/url.h"
 #include "engine/io/mesh/gltf_numbers.h"
 #include "engine/io/mesh/json_meter.h"
 
@@ -222,8 +223,8 @@ std::string GltfDocument::file_name(const std::string& uri) {
 
 // Opens a file that the document names.
 InputFile GltfDocument::open_part(const std::filesystem::path& name) const {
-  const std::filesystem::path part = path_.parent_path() / name;
-  if (!std::filesystem::is_regular_file(part)) fail("its file " + part.string() + " is missing");
+  const std::filesystem::path part = file_beside(path_, name.string());
+  if (!is_file(part)) fail("its file " + part.string() + " is missing");
   return InputFile(part);
 }
 

@@ -72,7 +72,7 @@ class GltfMesh {
       : document_(path, room.memory_bytes),
         room_(room),
         soup_(path, room_),
-        textures_(path.parent_path(), warnings_, room.textures),
+        textures_(path, warnings_, room.textures),
         materials_(document_, textures_, warnings_) {
     room_.memory_bytes -= std::min(room_.memory_bytes, document_.json_bytes());
     room_.one_sided = true;  // its materials know their sides

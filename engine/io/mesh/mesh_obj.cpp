@@ -16,9 +16,12 @@
 #include <map>
 #include <new>
 #include <set>
+#include <system_error>
 #include <utility>
 
 #include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/io/file/url.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/mesh/mesh_soup.h"
 #include "engine/io/mesh/mtl.h"
@@ -33,10 +36,7 @@ using Corner = MeshSoup::Corner;
 class ObjMesh {
  public:
   ObjMesh(const std::filesystem::path& path, const MeshRoom& room)
-      : path_(path),
-        stream_(path),
-        soup_(path, room),
-        textures_(path.parent_path(), warnings_, room.textures) {}
+      : path_(path), stream_(path), soup_(path, room), textures_(path, warnings_, room.textures) {}
 
   MeshFile read() {
     std::string_view line;
@@ -190,13 +190,21 @@ class ObjMesh {
     }
   }
 
+  static bool is_there(const std::filesystem::path& path) {
+    try {
+      return is_file(path);
+    } catch (const std::system_error& error) {  // S3 answers so where nobody may list a folder
+      if (error.code() != std::errc::permission_denied) throw;
+      return false;
+    }
+  }
+
   // Reads libraries: names that are separated by blanks, or one name with blanks in it, which may
   // be escaped by backslashes.
   void read_libraries(Words& words) {
     std::string whole(words.rest());
     std::ranges::replace(whole, '\\', '/');
-    std::error_code ignored;
-    if (std::filesystem::exists(path_.parent_path() / whole, ignored)) {
+    if (is_there(file_beside(path_, whole))) {
       read_library(whole);
       return;
     }
@@ -212,7 +220,7 @@ class ObjMesh {
   }
 
   void read_library(const std::string& name) {
-    const std::filesystem::path path = (path_.parent_path() / name).lexically_normal();
+    const std::filesystem::path path = file_beside(path_, name);
     if (!libraries_.insert(path.string()).second) return;  // reading again would define nothing new
     try {
       read_mtl(path, textures_, defined_, warnings_);
@@ -221,6 +229,7 @@ class ObjMesh {
     } catch (const LimitError&) {
       throw;
     } catch (const std::exception& error) {
+      if (is_net_failure(path, error)) throw;
       warnings_.add(kLibraryLeftOut, reason_for(name, path, error));
     }
   }

@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/io/file/url.h"
 #include "engine/io/image/byte_range.h"
 #include "engine/io/mesh/mesh_soup.h"
 
@@ -70,7 +71,7 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Text
   std::string relative = name;
   std::ranges::replace(relative, '\\', '/');
   // Normalise the name, because one file has many: a.png and ./a.png.
-  const std::filesystem::path path = (directory_ / relative).lexically_normal();
+  const std::filesystem::path path = file_beside(mesh_, relative);
   const auto [at, is_new] = loaded_.try_emplace({path.string(), use});
   if (!is_new || failed_.contains(path.string())) return at->second;
   try {
@@ -82,6 +83,7 @@ std::shared_ptr<const Texture> TextureLoader::load(const std::string& name, Text
   } catch (const LimitError&) {
     throw;
   } catch (const std::exception& error) {
+    if (is_net_failure(path, error)) throw;
     failed_.insert(path.string());
     warnings_.add(kTextureLeftOut, reason_for(name, path, error));
   }

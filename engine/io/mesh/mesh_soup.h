@@ -205,18 +205,18 @@ enum class TextureUse : std::uint8_t {
 class TextureLoader {
  public:
   /// Makes a loader for one mesh.
-  /// @param directory  directory of the mesh file, to which names of textures are relative
+  /// @param mesh       the file, to whose folder names of textures are relative
   /// @param warnings   receives the failures; must outlive this loader
   /// @param store      reads the textures; null: they stay in memory
-  TextureLoader(std::filesystem::path directory, MeshWarnings& warnings,
+  TextureLoader(std::filesystem::path mesh, MeshWarnings& warnings,
                 std::shared_ptr<TextureStore> store, std::uint64_t free_pixels = kMaxImagePixels)
-      : directory_(std::move(directory)),
+      : mesh_(std::move(mesh)),
         warnings_(warnings),
         store_(store ? std::move(store) : TextureStore::make()),
         free_pixels_(free_pixels) {}
 
   /// Returns the texture in a file; null after a warning, or for the opacity of an opaque one.
-  /// @param name  path relative to the directory, with / or \ between its parts
+  /// @param name  path relative to the folder of the mesh, with / or \ between its parts
   /// @throws LimitError when the texture takes more memory to decode than it may
   [[nodiscard]] std::shared_ptr<const Texture> load(const std::string& name,
                                                     TextureUse use = TextureUse::colour);
@@ -237,7 +237,7 @@ class TextureLoader {
   std::shared_ptr<const Texture> read(const ByteRange& bytes, const std::string& name,
                                       TextureUse use);
 
-  std::filesystem::path directory_;
+  std::filesystem::path mesh_;
   MeshWarnings& warnings_;
   std::shared_ptr<TextureStore> store_;
   std::uint64_t free_pixels_;

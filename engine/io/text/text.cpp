@@ -7,6 +7,8 @@
 #include <limits>
 #include <system_error>
 
+#include "engine/io/file/url.h"
+
 namespace ptc {
 namespace {
 
@@ -60,7 +62,7 @@ std::optional<std::int64_t> parse_integer(std::string_view word) noexcept {
 }
 
 std::string lower_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
+  std::string extension = std::filesystem::path(file_name(path)).extension().string();
   std::ranges::transform(extension, extension.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return extension;

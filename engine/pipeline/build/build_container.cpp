@@ -34,6 +34,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/file/remote_file.h"
+#include "engine/io/file/url.h"
 #include "engine/octree/merge.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
@@ -228,6 +230,8 @@ class Build {
   [[nodiscard]] MemoryBudget build_budget() const {
     MemoryBudget budget = budget_of(request_.run.memory_bytes, "this scene's build");
     if (request_.lights) charge_sky(budget, request_.lights->sky);
+    if (std::ranges::any_of(request_.inputs, is_url))
+      budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
     return budget;
   }
 
@@ -275,7 +279,7 @@ class Build {
     const std::uint64_t held = held_pages_bytes(request_.page_shift);
     budget.charge("node pages that wait", held);
     if (scene_) {
-      budget.charge("the directory of " + scene_->path().filename().string(),
+      budget.charge("the directory of " + file_name(scene_->path()),
                     ContainerReader::kMaxPageBytes * scene_->page_count());
     }
     if (resumption_) {
@@ -455,7 +459,7 @@ class Build {
     unlit_path_ = temporary_container_path(roomiest_temp_dir(request_.run, target_));
     unlit_ = std::make_unique<TemporaryName>(unlit_path_);
     if (scene_) {
-      progress_.note("the points of " + scene_->path().filename().string() +
+      progress_.note("the points of " + file_name(scene_->path()) +
                      " are lit anew together with those that are added, because lamps of one would "
                      "not light the other");
     }

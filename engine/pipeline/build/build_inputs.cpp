@@ -22,6 +22,7 @@
 #include "engine/io/cloud/las_vlrs.h"
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/record.h"
+#include "engine/io/file/url.h"
 #include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/scene_file.h"
@@ -192,12 +193,12 @@ void plan_channels(const BuildRequest& request, const ContainerReader* scene, bo
   bool indexed = request.original_order;
   if (scene) {
     plan_scene(*scene, inputs.clouds, meshes, plan);
-    if (scene->superblock().points > 0) sources.push_back({scene->path().filename().string(), 0});
+    if (scene->superblock().points > 0) sources.push_back({file_name(scene->path()), 0});
     indexed |= find_in_row(scene->meta().channels, kOriginalIndex).has_value();
   }
   for (Clouds::Cloud& cloud : inputs.clouds.files) {
     if (!cloud.channels.empty()) cloud.input = plan.add_input(cloud.channels, cloud.taken);
-    if (cloud.points > 0) sources.push_back({cloud.path.filename().string(), cloud.input});
+    if (cloud.points > 0) sources.push_back({file_name(cloud.path), cloud.input});
   }
   if (meshes) sources.push_back({"what is sampled on meshes", AttributePlan::kNoInput});
   if (indexed) plan.add_original_index();
@@ -235,7 +236,7 @@ void load_recorded_sky(const SceneObjects& objects, BuildInputs& inputs, const M
   const auto name = inputs.clouds.named_by.find(kLightsKey);
   if (name == inputs.clouds.named_by.end()) return;
   const auto of = std::ranges::find_if(objects.objects, [&](const SceneObject& object) {
-    return object.file.filename().string() == name->second;
+    return file_name(object.file) == name->second;
   });
   if (of == objects.objects.end()) return;
   const auto store = TextureStore::make(limits.textures, limits.temp_directory);
@@ -362,7 +363,7 @@ void Clouds::measure(const std::filesystem::path& path, const std::optional<Plac
                      const Selection& selection, BoundsFrom from, bool alone, Progress& progress) {
   PointFile file = open_placed_points(path, selection, place);
   // Note what the file says of all its points, once
-  const std::string name = path.filename().string();
+  const std::string name = file_name(path);
   if (from == BoundsFrom::files) {
     for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
   }
@@ -431,8 +432,8 @@ void Clouds::read_points(PointFile& file, bool alone, Cloud& cloud, Progress& pr
   if (scan && cloud.points > 0)
     scan->radii |= lacks_radii;  // formats that must have radii have zeros
   if (const std::uint64_t lost = file.source->left_out()) {
-    progress.note(fmt::format("{}: {} records name no place and are left out",
-                              cloud.path.filename().string(), lost));
+    progress.note(
+        fmt::format("{}: {} records name no place and are left out", file_name(cloud.path), lost));
   }
 }
 

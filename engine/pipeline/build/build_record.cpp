@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/io/file/url.h"
 #include "engine/pipeline/build/append.h"
 #include "engine/pipeline/scene_record.h"
 #include "format/text.h"
@@ -27,7 +28,7 @@ Meta make_meta(const BuildRequest& request, const BuildInputs& inputs) {
   for (const auto& input : request.inputs) {
     if (!request.input_names.empty()) break;
     if (!names.empty()) names += ' ';
-    names += printable(input.filename().string());
+    names += printable(file_name(input));
   }
   if (request.city_points > 0) names = "city " + std::to_string(request.city_points);
   meta.text[kInputsKey] = names;

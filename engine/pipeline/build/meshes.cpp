@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/base/surfel.h"
+#include "engine/io/file/url.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/scene/ray_scene.h"
 
@@ -84,7 +85,7 @@ void add_in_places(const std::vector<Item>& items, const std::vector<Placement>&
 
 /// Says which file the objects and materials of a mesh come from.
 void name_parts(Mesh& mesh, const SceneObject& object) {
-  const std::string file = object.file.filename().string();
+  const std::string file = file_name(object.file);
   if (mesh.objects.empty() && !mesh.triangles.empty()) {
     mesh.objects.emplace_back();
     mesh.object_runs.push_back({});

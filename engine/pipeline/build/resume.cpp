@@ -21,6 +21,8 @@
 #include "engine/base/background.h"
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
+#include "engine/io/file/remote_file.h"
+#include "engine/io/file/url.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/scene_file.h"
 #include "format/checksum.h"
@@ -66,6 +68,12 @@ std::string text_of(const BuildRequest& request) {
   };
   line("the program", writer_name());
   const auto file = [&](const char* name, const std::filesystem::path& path) {
+    if (is_url(path)) {
+      const RemoteFile remote(path.string());
+      line(name, fmt::format("{}, {} bytes, version {}", file_name(path), remote.size(),
+                             remote.version()));
+      return;
+    }
     const auto changed = std::filesystem::last_write_time(path).time_since_epoch().count();
     const std::string whole = std::filesystem::absolute(path).string();
     line(name,

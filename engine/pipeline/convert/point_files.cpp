@@ -11,6 +11,7 @@
 #include "engine/io/cloud/points.h"
 #include "engine/io/cloud/rounding.h"
 #include "engine/io/cloud/rounding_survey.h"
+#include "engine/io/file/url.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/attributes.h"
@@ -211,8 +212,7 @@ PointWriteInfo describe_points(const ContainerReader& container, const PointFile
 PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFileOptions& options,
                                std::optional<OutputFormat> format, Progress& progress) {
   PointFile file = open_point_input(cloud, options.selection);
-  for (const std::string& note : file.info.notes)
-    progress.note(cloud.filename().string() + ": " + note);
+  for (const std::string& note : file.info.notes) progress.note(file_name(cloud) + ": " + note);
   PointWriteInfo info{.channels = file.info.channels,
                       .text = file.info.text,
                       .has_normals = file.info.has_normals,

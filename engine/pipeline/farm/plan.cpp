@@ -11,6 +11,7 @@
 
 #include "engine/base/error.h"
 #include "engine/io/file/text_file.h"
+#include "engine/io/file/url.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
@@ -305,6 +306,10 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   if (plan.shading) {
     plan.shading->target = std::filesystem::absolute(plan.shading->target);
     check_shade_by_ranges(plan.shading->request, plan.shading->target);
+  }
+  for (const std::filesystem::path& input : request.inputs) {
+    if (is_url(input))
+      throw DataError(input.string() + ": a plan takes files that all machines see, and no URL");
   }
   check_plan_paths(request, plan);
   std::map<std::filesystem::path, std::vector<InputState>> states;

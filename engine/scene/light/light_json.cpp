@@ -20,6 +20,8 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
+#include "engine/io/file/file.h"
+#include "engine/io/file/url.h"
 #include "engine/scene/json_fields.h"
 #include "engine/scene/light/lights.h"
 #include "format/checksum.h"
@@ -217,11 +219,11 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory, TextureSto
   if (sky.map_path.empty()) return SkyMap::none;
   const std::filesystem::path recorded(sky.map_path);
   const std::filesystem::path beside = directory / recorded.filename();
-  std::error_code absent;
-  const bool is_there = std::filesystem::exists(recorded, absent);
-  if (!is_there && !std::filesystem::exists(beside, absent)) {
-    const bool elsewhere = std::filesystem::absolute(beside).lexically_normal() !=
-                           std::filesystem::absolute(recorded).lexically_normal();
+  const bool is_there = is_file(recorded);
+  if (!is_there && !is_file(beside)) {
+    const bool elsewhere =
+        is_url(beside) || std::filesystem::absolute(beside).lexically_normal() !=
+                              std::filesystem::absolute(recorded).lexically_normal();
     throw DataError("the sky picture " + recorded.string() + " that lit the scene does not exist" +
                     (elsewhere ? ", and neither does " + beside.string() : "") +
                     ": put it there, or give a sky to what shades the scene or lights it anew");
