@@ -9,7 +9,6 @@
 #include <cerrno>
 #include <csignal>
 #include <map>
-#include <set>
 #include <system_error>
 #include <thread>
 
@@ -47,6 +46,7 @@ class Runner {
         cores_(run.threads > 0 ? run.threads : std::max(1U, std::thread::hardware_concurrency())),
         progress_(progress) {
     for (const FarmTask& task : plan.tasks) {
+      ++counts_[task.kind];
       if (task.memory_bytes > memory_bytes_) {
         throw LimitError(fmt::format("{} takes up to {} bytes: the least cap is {}", task.name(),
                                      task.memory_bytes, task.memory_bytes));
@@ -63,33 +63,23 @@ class Runner {
         waiting_.push_back(&task);
         continue;
       }
-      done_.insert(task.name());
+      ++done_[task.kind];
       ++result_.skipped;
       progress_.advance(1);
     }
     while (start_ready() || !running_.empty()) await_one();
-    require_all_started();
     progress_.end();
     return std::move(result_);
   }
 
  private:
-  /// Refuses a plan in which tasks wait for each other, or for tasks that it does not have.
-  void require_all_started() const {
-    if (waiting_.empty() || !result_.failed.empty()) return;
-    std::string names;
-    for (const FarmTask* task : waiting_) names += (names.empty() ? "" : ", ") + task->name();
-    throw DataError(plan_.file.string() + ": the tasks before these never end: " + names);
-  }
-
   /// Starts all tasks that may run and fit. @return whether one was started
   bool start_ready() {
     if (!result_.failed.empty()) return false;
     bool started = false;
     for (auto at = waiting_.begin(); at != waiting_.end();) {
       const FarmTask& task = **at;
-      const bool ready =
-          std::ranges::all_of(task.after, [&](const auto& name) { return done_.contains(name); });
+      const bool ready = !task.after || done_[*task.after] == counts_[*task.after];
       if (!ready || running_.size() >= cores_ || used_bytes_ + task.memory_bytes > memory_bytes_) {
         ++at;
         continue;
@@ -103,8 +93,7 @@ class Runner {
 
   /// Returns how many of the tasks that may run now run beside each other.
   [[nodiscard]] unsigned at_once(const FarmTask& task) const {
-    const auto same =
-        static_cast<std::uint64_t>(std::ranges::count(plan_.tasks, task.kind, &FarmTask::kind));
+    const std::uint64_t same = counts_.at(task.kind);
     const std::uint64_t fit =
         std::max<std::uint64_t>(memory_bytes_ / std::max<std::uint64_t>(task.memory_bytes, 1), 1);
     return static_cast<unsigned>(std::min<std::uint64_t>({same, fit, cores_}));
@@ -153,7 +142,7 @@ class Runner {
     }
     progress_.advance(1);
     if (code == 0) {
-      done_.insert(task.name());
+      ++done_[task.kind];
       ++result_.ran;
     } else {
       fail(task, code);
@@ -178,8 +167,8 @@ class Runner {
   Progress& progress_;
   std::vector<const FarmTask*> waiting_;
   std::map<pid_t, const FarmTask*> running_;
-  std::set<std::string> done_;
-  std::map<const FarmTask*, unsigned> tries_;  ///< that failed
+  std::map<TaskKind, std::uint64_t> counts_, done_;  ///< tasks of a kind, and how many are done
+  std::map<const FarmTask*, unsigned> tries_;        ///< that failed
   std::uint64_t used_bytes_ = 0;
   FarmRun result_;
 };

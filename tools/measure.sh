@@ -83,6 +83,7 @@ measure error error fractal window city "$mesh+backdrop" --points 200k --checked
   "$mesh+backdrop" --points 2k --checked 20 --check-rays 256
 measure error-sparse error city --points 2M --set sparse --checked 500 --check-rays 4096 -- \
   city --points 2k --set sparse --checked 20 --check-rays 256
+measure farm farm -- --points 20k --parts 2 --shaded 2k "${once[@]}"
 measure formats formats -- --points 20k "${once[@]}"
 measure glossy glossy city "$mesh" -- city --points 4k --checked 20 "${once[@]}"
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \

@@ -142,15 +142,15 @@ int main(int argc, char** argv) {
   Arguments arguments;
   std::list<std::pair<Experiment, Declaration>> all;
   for (const auto make :
-       {make_accuracy_experiment,     make_build_experiment,     make_cache_experiment,
-        make_demo_experiment,         make_error_experiment,     make_formats_experiment,
-        make_glossy_experiment,       make_growth_experiment,    make_hunt_experiment,
-        make_instructions_experiment, make_knob_experiment,      make_model_experiment,
-        make_mutations_experiment,    make_relight_experiment,   make_remote_experiment,
-        make_rooms_experiment,        make_scale_experiment,     make_scan_experiment,
-        make_sort_experiment,         make_specks_experiment,    make_stability_experiment,
-        make_surfels_experiment,      make_tolerance_experiment, make_truth_experiment,
-        make_verify_experiment}) {
+       {make_accuracy_experiment,  make_build_experiment,        make_cache_experiment,
+        make_demo_experiment,      make_error_experiment,        make_farm_experiment,
+        make_formats_experiment,   make_glossy_experiment,       make_growth_experiment,
+        make_hunt_experiment,      make_instructions_experiment, make_knob_experiment,
+        make_model_experiment,     make_mutations_experiment,    make_relight_experiment,
+        make_remote_experiment,    make_rooms_experiment,        make_scale_experiment,
+        make_scan_experiment,      make_sort_experiment,         make_specks_experiment,
+        make_stability_experiment, make_surfels_experiment,      make_tolerance_experiment,
+        make_truth_experiment,     make_verify_experiment}) {
     const Experiment experiment = make();
     CLI::App* const app = command.app().add_subcommand(experiment.name, experiment.purpose);
     auto& [kept, declaration] = all.emplace_back(experiment, Declaration(*app));

@@ -72,21 +72,20 @@ void add_shading(FarmPlan& plan, std::uint64_t memory_bytes) {
   const std::size_t ranges = plan.shading->ranges;
   const std::uint64_t points = plan.points / ranges;
   FarmTask collect{.kind = TaskKind::collect,
-                   .inputs = {plan.scene},
+                   .after = TaskKind::shade,
+                   .inputs = {plan.scene, plan.folder() / "shade.*"},
                    .outputs = {plan.shading->target},
                    .memory_bytes = memory_bytes,
                    .disk_bytes = plan.points * 2 * kResultBytes,
                    .seconds = static_cast<double>(plan.points) * kCollectSeconds};
   for (std::size_t i = 0; i < ranges; ++i) {
     FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::shade, .number = i});
-    task.after = {"join"};
+    task.after = TaskKind::join;
     task.inputs = {plan.scene};
     task.outputs = {plan.output(TaskKind::shade, i)};
     task.memory_bytes = memory_bytes;
     task.disk_bytes = points * kResultBytes;
     task.seconds = static_cast<double>(points) * kShadeSeconds;
-    collect.after.push_back(task.name());
-    collect.inputs.push_back(task.outputs[0]);
   }
   plan.tasks.push_back(std::move(collect));
 }
@@ -94,7 +93,6 @@ void add_shading(FarmPlan& plan, std::uint64_t memory_bytes) {
 void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
   // Route each input
   const std::uint64_t row = plan.row().bytes();
-  std::vector<std::string> routes, parts;
   for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
     const FarmInput& input = plan.inputs[i];
     FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::route, .number = i});
@@ -103,24 +101,23 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
     task.memory_bytes = memory_bytes;
     task.disk_bytes = input.points * row;
     task.seconds = static_cast<double>(input.points) * kRouteSeconds;
-    routes.push_back(task.name());
   }
 
   // Build each range of all of them, and join the parts
-  FarmTask join{.kind = TaskKind::join, .outputs = {plan.scene}, .memory_bytes = memory_bytes};
+  FarmTask join{.kind = TaskKind::join,
+                .after = TaskKind::part,
+                .inputs = {plan.folder() / "*.ptcx"},
+                .outputs = {plan.scene},
+                .memory_bytes = memory_bytes};
   for (std::size_t i = 0; i < plan.parts(); ++i) {
     FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::part, .number = i});
-    task.after = routes;
-    for (std::size_t k = 0; k < routes.size(); ++k)
-      task.inputs.push_back(plan.output(TaskKind::route, k));
+    task.after = TaskKind::route;
+    task.inputs = {plan.folder() / "route.*"};
     task.outputs = {plan.output(TaskKind::part, i)};
     task.memory_bytes = memory_bytes;
     task.disk_bytes = plan.points / plan.parts() * kStoredBytes;
     task.seconds = static_cast<double>(plan.points / plan.parts()) * kPartSeconds;
-    parts.push_back(task.name());
-    join.inputs.push_back(task.outputs[0]);
   }
-  join.after = std::move(parts);
   join.disk_bytes = plan.parts() * 4096;
   join.seconds = 0.01 * static_cast<double>(plan.parts());
   plan.tasks.push_back(std::move(join));

@@ -40,10 +40,11 @@ enum class TaskKind { route, part, join, shade, collect };
 /// One task of a plan.
 struct FarmTask {
   TaskKind kind = TaskKind::route;
-  std::size_t number = 0;            ///< among the tasks of its kind
-  std::vector<std::string> command;  ///< from the program on
-  std::vector<std::string> after;    ///< names of the tasks that must be done before
-  std::vector<std::filesystem::path> inputs, outputs;
+  std::size_t number = 0;                     ///< among the tasks of its kind
+  std::vector<std::string> command;           ///< from the program on
+  std::optional<TaskKind> after;              ///< all tasks of this kind must be done before
+  std::vector<std::filesystem::path> inputs;  ///< "route.*" stands for the files of all routes
+  std::vector<std::filesystem::path> outputs;
   std::uint64_t memory_bytes = 0;  ///< the cap that it is given
   std::uint64_t disk_bytes = 0;    ///< of its outputs, about
   double seconds = 0;              ///< expected, on one core

@@ -185,7 +185,7 @@ OrderedJson to_json(const FarmTask& task) {
           {"kind", name_of(task.kind)},
           {"number", task.number},
           {"command", task.command},
-          {"after", task.after},
+          {"after", task.after ? OrderedJson(name_of(*task.after)) : OrderedJson()},
           {"inputs", to_json(task.inputs)},
           {"outputs", to_json(task.outputs)},
           {"memory_bytes", task.memory_bytes},

@@ -365,9 +365,8 @@ bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
 
 /// Refuses a task before its time.
 void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
-  for (const std::string& name : task.after) {
-    const auto before = std::ranges::find(plan.tasks, name, &FarmTask::name);
-    if (before == plan.tasks.end() || !is_done(plan, *before)) fail_unseen(plan, task, name);
+  for (const FarmTask& before : plan.tasks) {
+    if (before.kind == task.after && !is_done(plan, before)) fail_unseen(plan, task, before.name());
   }
 }
 

@@ -44,6 +44,7 @@ struct Experiment {
 [[nodiscard]] Experiment make_cache_experiment();
 [[nodiscard]] Experiment make_demo_experiment();
 [[nodiscard]] Experiment make_error_experiment();
+[[nodiscard]] Experiment make_farm_experiment();
 [[nodiscard]] Experiment make_formats_experiment();
 [[nodiscard]] Experiment make_glossy_experiment();
 [[nodiscard]] Experiment make_growth_experiment();
