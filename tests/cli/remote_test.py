@@ -171,7 +171,14 @@ class Remote(ProgramTest):
             handler.close_connection = number % 2 == 1
             return handler.close_connection
 
-        for fault in (broken_off, unavailable, hung_up):
+        def half_a_head(handler, number, path, first, last):
+            if number % 2 == 0:
+                return False
+            handler.wfile.write(self.head(first, last)[:60])
+            handler.close_connection = True
+            return True
+
+        for fault in (broken_off, unavailable, hung_up, half_a_head):
             self.server.requests.clear()
             self.server.fault = fault
             self.assertEqual(self.facts(self.url), expected, fault)

@@ -278,8 +278,6 @@ bool may_pass(long status) {
 class Server {
  public:
   explicit Server(std::string url) : url_(std::move(url)) {}
-  [[nodiscard]] const std::string& url() const noexcept { return url_; }
-
   /// Asks for bytes until all have come, or the file ends.
   /// @param identity  what each answer must be of; without a value, the first one tells it
   void get(std::uint64_t offset, std::uint64_t bytes, std::optional<Identity>& identity,
@@ -289,7 +287,8 @@ class Server {
       Answer answer{.offset = offset, .wanted = bytes, .sink = &sink};
       const CURLcode code = connection.get(web_request(url_), answer);
       if (answer.failure) std::rethrow_exception(answer.failure);
-      if (accepts(answer, identity)) {
+      const bool cut_short = answer.status == 206 && answer.got == 0;  // perhaps in its headers
+      if (!cut_short && accepts(answer, identity)) {
         offset += answer.got;
         bytes -= answer.got;
         if (answer.got > 0) failed = 0;
@@ -297,10 +296,11 @@ class Server {
         if (code == CURLE_OK && answer.got > 0) continue;  // servers may limit what they send
       }
       std::string why = connection.error(code);
-      if (code == CURLE_OK || answer.status >= 400)
+      if (code == CURLE_OK || answer.status >= 400) {
         why = answer.status == 206
                   ? "an answer is shorter than it says"
                   : fmt::format("the server answers with status {}", answer.status);
+      }
       if (code == CURLE_URL_MALFORMAT || code == CURLE_UNSUPPORTED_PROTOCOL) refuse(why);
       if (!may_pass(answer.status) && answer.status != 206 && !may_pass(code)) fail(EIO, why);
       if (++failed == RemoteFile::kTries) fail(EIO, fmt::format("{}, {} times", why, failed));

@@ -19,8 +19,9 @@ namespace ptc {
 /// length.
 ///
 /// What has come is kept in a file without a name, in spool_directory(), so that each block is
-/// asked for once while any RemoteFile of its URL is open in the process. Where that disk has less
-/// than 1 GiB left, what is asked for is read from the server each time.
+/// asked for once while any RemoteFile of its URL is open in the process. What has come of the URL
+/// that was opened last is kept until another one is opened. Where that disk has less than 1 GiB
+/// left, what is asked for is read from the server each time.
 ///
 /// A request that fails in a way that may pass (no connection, one that breaks off, the statuses
 /// 408, 429, 500, 502, 503 and 504) is sent again for what is still missing, up to kTries times
