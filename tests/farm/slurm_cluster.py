@@ -136,11 +136,12 @@ class Cluster:
     def kill_node(self, node):
         """Ends a node with all that runs on it, as a power loss would."""
         victims = self.processes(node) | {self.pid(node)}
-        for pid in victims:
-            try:
-                os.kill(pid, signal.SIGKILL)
-            except ProcessLookupError:
-                pass
+        for number in (signal.SIGSTOP, signal.SIGKILL):  # none sees another one go, and tells the controller
+            for pid in victims:
+                try:
+                    os.kill(pid, number)
+                except ProcessLookupError:
+                    pass
         return victims
 
     def stop(self):

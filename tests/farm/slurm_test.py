@@ -87,8 +87,10 @@ class Slurm(unittest.TestCase):
         self.assertEqual(states, {("running", "RUNNING")})
         self.assertGreater(len(self.cluster.kill_node(node)), 3)  # slurmd, a step, a script, a task
 
-        # The controller is away while no job ends, which would wait for it longer, and knows its jobs again
+        # The controller is away while no job ends, which would wait for it longer or be lost, and knows its jobs again
         self.wait_for("the other parts", lambda status: status["done"] >= 11)
+        self.cluster.wait("the ends of their jobs", lambda: all(
+            line.split()[-1] == node for line in self.cluster.call("squeue", "-h", "-t", "R,CG", "-o", "%i %N").splitlines()))
         self.cluster.stop_controller()
         self.assertIn("squeue", self.status()["trouble"])
         self.cluster.start_controller()
