@@ -13,7 +13,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -27,6 +26,7 @@
 #include "engine/pipeline/parts/part_edges.h"
 #include "engine/store/reader.h"
 #include "tools/bench/references/timed_runs.h"
+#include "tools/bench/scenes/work_file.h"
 
 namespace ptc::bench {
 namespace {
@@ -36,30 +36,6 @@ namespace {
 constexpr double kStartSeconds = 0.01, kListedSeconds = 2.1e-5;
 constexpr std::uint64_t kModelRoutePoints = 40'000'000, kModelPartPoints = 50'000'000,
                         kModelRangePoints = 10'000'000;
-
-/// A directory that is gone at the end.
-class WorkFolder {
- public:
-  explicit WorkFolder(const std::filesystem::path& work)
-      : path_(work / fmt::format(".ptcbench-{}-farm", ::getpid())) {
-    std::filesystem::create_directories(path_);
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-  void clear() const {
-    for (const auto& entry : std::filesystem::directory_iterator(path_))
-      std::filesystem::remove_all(entry.path());
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// What a container holds, whether or not it is in parts. Parts have tops of their own, so that the
 /// numbers of nodes differ.
@@ -89,7 +65,10 @@ class FarmMeasurement {
  public:
   FarmMeasurement(const FarmBenchOptions& options, const std::filesystem::path& work,
                   const RunOptions& run, Progress& progress)
-      : options_(options), folder_(work), run_(run), progress_(progress) {
+      : options_(options),
+        folder_(work / fmt::format(".ptcbench-{}-farm", ::getpid())),
+        run_(run),
+        progress_(progress) {
     constexpr std::uint64_t kBytes = 120;  // of a point: rows, parts and one container
     require_room({&work, 1}, options.points * kBytes, fmt::format("{} points", options.points));
   }
@@ -280,7 +259,7 @@ class FarmMeasurement {
   }
 
   const FarmBenchOptions& options_;
-  WorkFolder folder_;
+  WorkDirectory folder_;
   RunOptions run_;
   Progress& progress_;
   std::map<TaskKind, KindCost> kinds_;

@@ -23,24 +23,6 @@ namespace {
 
 constexpr unsigned kSide = 4;  // rays along the side of a pixel that tell what it shows
 
-/// A directory of temporary files.
-class WorkDirectory {
- public:
-  explicit WorkDirectory(const std::filesystem::path& path) : path_(path) {
-    std::filesystem::create_directories(path_);
-  }
-  ~WorkDirectory() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  WorkDirectory(const WorkDirectory&) = delete;
-  WorkDirectory& operator=(const WorkDirectory&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 /// Says of each pixel whether all rays through it and its borders meet one surface that is smooth
 /// and does not emit.
 std::vector<char> pixels_of_one_surface(const RayScene& scene, const Camera& camera,

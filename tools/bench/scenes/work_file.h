@@ -1,10 +1,11 @@
-// Names of files that an experiment needs while it runs.
+// Names of files, and directories, that an experiment needs while it runs.
 #pragma once
 
 #include <unistd.h>
 
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "engine/io/file/file.h"
 
@@ -22,6 +23,30 @@ class WorkFile {
  private:
   std::filesystem::path path_;
   TemporaryName name_;
+};
+
+/// A directory of temporary files, which is deleted with all that is in it when this object ends.
+class WorkDirectory {
+ public:
+  explicit WorkDirectory(const std::filesystem::path& path) : path_(path) {
+    std::filesystem::create_directories(path_);
+  }
+  ~WorkDirectory() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  WorkDirectory(const WorkDirectory&) = delete;
+  WorkDirectory& operator=(const WorkDirectory&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+  /// Deletes all that is in it.
+  void clear() const {
+    for (const auto& entry : std::filesystem::directory_iterator(path_))
+      std::filesystem::remove_all(entry.path());
+  }
+
+ private:
+  std::filesystem::path path_;
 };
 
 }  // namespace ptc::bench
