@@ -1,18 +1,4 @@
-// Positioned file access over POSIX calls, and the registry of temporary names for signal handlers.
-//
-// A temporary file must disappear when the process ends, whether by an exception (destructors) or
-// by a signal that a user or the system sends to end it (a handler that walks the registry). The
-// handler may run in any thread at any time:
-//
-//   create_temporary()            handler
-//   block fatal signals           block fatal signals
-//   take the lock                 take the lock, never release it
-//   create file, add name         unlink all names
-//   release, unblock              end the process
-//
-// Whoever changes the registry holds the lock with fatal signals blocked in its own thread. So a
-// handler that waits for the lock never waits for the thread that it interrupted. A file and its
-// name appear in one step that no signal can divide. After the handler no file can appear.
+// Positioned file access over POSIX calls.
 #include "engine/io/file/file.h"
 
 #include <fcntl.h>
@@ -21,12 +7,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
-#include <csignal>
 #include <limits>
-#include <list>
-#include <new>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -35,6 +17,7 @@
 #include "engine/base/error.h"
 #include "engine/io/file/remote_file.h"
 #include "engine/io/file/temporary_name.h"
+#include "engine/io/file/temporary_registry.h"
 #include "engine/io/file/url.h"
 
 namespace ptc {
@@ -88,80 +71,6 @@ void write_whole(int fd, const std::filesystem::path& path, std::uint64_t offset
     if (count == 0) fail(EIO, "pwrite", path);
     done += static_cast<std::size_t>(count);
   }
-}
-
-constexpr std::array kFatalSignals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU};
-std::atomic_flag registry_lock = ATOMIC_FLAG_INIT;
-
-// An absolute name that a fatal signal removes.
-struct Temporary {
-  const void* owner;
-  std::string name;
-};
-
-std::list<Temporary>& live_temporaries() {
-  // Construct it in static memory and never destroy it: it outlives static destructors and needs
-  // no heap.
-  alignas(std::list<Temporary>) static std::byte room[sizeof(std::list<Temporary>)];
-  static auto* const names = new (room) std::list<Temporary>;
-  return *names;
-}
-
-// Blocks fatal signals in this thread and returns the signals that were blocked before.
-sigset_t block_fatal_signals() {
-  sigset_t fatal, before;
-  sigemptyset(&fatal);
-  for (const int signal : kFatalSignals) sigaddset(&fatal, signal);
-  pthread_sigmask(SIG_BLOCK, &fatal, &before);
-  return before;
-}
-
-// Holds the lock of the registry, with fatal signals blocked.
-class RegistryGuard {
- public:
-  RegistryGuard() : before_(block_fatal_signals()) {
-    while (registry_lock.test_and_set(std::memory_order_acquire)) {
-    }
-  }
-  ~RegistryGuard() {
-    registry_lock.clear(std::memory_order_release);
-    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
-  }
-  RegistryGuard(const RegistryGuard&) = delete;
-  RegistryGuard& operator=(const RegistryGuard&) = delete;
-
- private:
-  sigset_t before_;
-};
-
-// Creates a file and registers its name in one step that no handled signal can divide. Returns the
-// descriptor, or -1 and errno.
-int create_temporary(const void* owner, const std::filesystem::path& path) {
-  std::list<Temporary> entry{{owner, std::filesystem::absolute(path).string()}};
-  auto& names = live_temporaries();
-  const RegistryGuard guard;
-  const int fd = open_retrying(path, O_RDWR | O_CREAT | O_EXCL, 0666);
-  if (fd >= 0) names.splice(names.end(), entry);
-  return fd;
-}
-
-// Removes a name from the registry. It allocates nothing, because it is called while an exception
-// propagates, perhaps for lack of memory.
-void forget_temporary(const void* owner) noexcept {
-  std::list<Temporary> removed;  // freed after the guard
-  auto& names = live_temporaries();
-  const RegistryGuard guard;
-  for (auto it = names.begin(); it != names.end(); ++it) {
-    if (it->owner != owner) continue;
-    removed.splice(removed.end(), names, it);
-    return;
-  }
-}
-
-void unlink_and_reraise(int signal) {
-  remove_temporaries();
-  // Because of SA_RESETHAND, the default action follows when this handler returns.
-  static_cast<void>(::raise(signal));
 }
 
 // Returns the permissions of the file that will be replaced, or nothing when there is none. It
@@ -379,10 +288,7 @@ void OutputFile::publish(const InputFile* source) {
 }
 
 TemporaryName::TemporaryName(const std::filesystem::path& path) : path_(path) {
-  std::list<Temporary> entry{{this, std::filesystem::absolute(path).string()}};
-  auto& names = live_temporaries();
-  const RegistryGuard guard;
-  names.splice(names.end(), entry);
+  add_temporary(this, path);
 }
 
 TemporaryName::~TemporaryName() {
@@ -394,29 +300,6 @@ TemporaryName::~TemporaryName() {
 void TemporaryName::release() noexcept {
   path_.clear();
   forget_temporary(this);
-}
-
-// Keeps the lock, so that no other thread can create a file before the process ends.
-void remove_temporaries() noexcept {
-  block_fatal_signals();
-  while (registry_lock.test_and_set(std::memory_order_acquire)) {
-  }
-  for (const Temporary& temporary : live_temporaries()) ::unlink(temporary.name.c_str());
-}
-
-void remove_temporaries_on_signal() {
-  live_temporaries();  // construct the list here, not in the handler
-  for (const int signal : kFatalSignals) {
-    struct sigaction before {};
-    ::sigaction(signal, nullptr, &before);
-    if (before.sa_handler == SIG_IGN) continue;
-    struct sigaction action {};
-    action.sa_handler = unlink_and_reraise;
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
-    sigemptyset(&action.sa_mask);
-    for (const int other : kFatalSignals) sigaddset(&action.sa_mask, other);
-    ::sigaction(signal, &action, nullptr);
-  }
 }
 
 TempFile::TempFile(const std::filesystem::path& directory) : directory_(directory) {

@@ -52,8 +52,7 @@ class InputFile {
   [[nodiscard]] bool is_named(const std::filesystem::path& path) const;
   /// Fills `out` with the bytes of the file from `offset` on.
   /// @throws DataError when the file ends before `out` is full; std::system_error when a read
-  /// fails;
-  ///         RemoteFile's errors
+  ///         fails; RemoteFile's errors
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
   /// Asks the system to begin reading these bytes into its page cache, because they will be read
   /// soon. It does nothing for a remote file.

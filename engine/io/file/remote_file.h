@@ -1,4 +1,4 @@
-// A file on a server, read in ranges over HTTP (RFC 9110, section 14).
+// A file on a server, read in ranges, of which each comes once.
 //
 //   server           | block | block | block | block | ...
 //                            |<----- a request ----->|        what is missing, and some behind it
@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 
@@ -23,12 +22,9 @@ namespace ptc {
 /// that was opened last is kept until another one is opened. Where that disk has less than 1 GiB
 /// left, what is asked for is read from the server each time.
 ///
-/// A request that fails in a way that may pass (no connection, one that breaks off, the statuses
-/// 408, 429, 500, 502, 503 and 504) is sent again for what is still missing, up to kTries times
-/// without a byte, with pauses that double from kFirstPause on or are as long as the server asks
-/// for; then all further reads of the file fail at once. Each answer must be of the file that was
-/// opened: its length and its ETag, or without one its Last-Modified, are compared. Of a server
-/// that tells neither, each opening reads anew.
+/// Requests that fail are sent again as WebServer says; then all further reads of the file fail at
+/// once. Each answer must be of the file that was opened: its length and its ETag, or without one
+/// its Last-Modified, are compared. Of a server that tells neither, each opening reads anew.
 ///
 /// Threads: read_at() may be called concurrently; threads that need one block share its request.
 /// Memory: kMemoryBytes for all files of the process together.
@@ -37,17 +33,11 @@ class RemoteFile {
  public:
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
   static constexpr std::size_t kMostAhead = 8;  ///< blocks of one request, where reads follow on
-  static constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 42;  ///< of a file
-  static constexpr unsigned kTries = 5;
-  static constexpr double kFirstPause = 0.2, kLongestPause = 30;          ///< seconds
   static constexpr std::uint64_t kMemoryBytes = std::uint64_t{16} << 20;  ///< mostly libcurl's
   static constexpr char kMemory[] = "what comes from servers";            ///< names it in messages
 
   /// Opens a URL (url.h).
-  /// @throws std::system_error that names the URL: ENOENT for the statuses 404 and 410, EACCES for
-  ///         401 and 403, EIO for other failures, ELIBACC without libcurl, ENOTSUP where libcurl
-  ///         lacks an option; DataError for a URL that is malformed or a server that does not
-  ///         answer requests for ranges
+  /// @throws as WebServer::get()
   explicit RemoteFile(const std::string& url);
 
   /// Returns the length of the file, bytes.
@@ -57,7 +47,7 @@ class RemoteFile {
   [[nodiscard]] const std::string& version() const noexcept;
   /// Fills `out` with the bytes of the file from `offset` on.
   /// @throws DataError when the file ends before `out` is full, or is another one than was opened;
-  ///         std::system_error as the constructor
+  ///         as WebServer::get()
   void read_at(std::uint64_t offset, std::span<std::byte> out) const;
 
   /// Returns the directory of what has come: TMPDIR, or without it /var/tmp, which is a disk where
