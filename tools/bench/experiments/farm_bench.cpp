@@ -7,13 +7,9 @@
 
 #include <unistd.h>
 
-#include <atomic>
 #include <cmath>
-#include <exception>
 #include <map>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -23,7 +19,6 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/farm/tasks.h"
-#include "engine/pipeline/parts/part_edges.h"
 #include "engine/store/reader.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/work_file.h"
@@ -32,7 +27,7 @@ namespace ptc::bench {
 namespace {
 
 // CPU time of `ptcfarm part` that finds its task done or not yet to be done, with plans of 5 and of
-// 10,006 tasks, medians of 3 and 5 runs
+// 10,006 tasks, medians of 5 and 3 runs
 constexpr double kStartSeconds = 0.01, kListedSeconds = 2.1e-5;
 constexpr std::uint64_t kModelRoutePoints = 40'000'000, kModelPartPoints = 50'000'000,
                         kModelRangePoints = 10'000'000;
@@ -130,13 +125,21 @@ class FarmMeasurement {
     return content_of(target);
   }
 
-  Content build_parts(unsigned workers) {
-    FarmOptions options{.parts = options_.parts, .memory_bytes = options_.task_memory};
+  /// Plans a city in parts.
+  /// @param shading  how it is shaded; empty: not at all
+  [[nodiscard]] FarmPlan plan_city(const BuildRequest& city, std::uint64_t parts,
+                                   const std::optional<FarmShading>& shading = {}) const {
+    FarmOptions options{.parts = parts, .memory_bytes = options_.task_memory, .shading = shading};
     options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
     Progress silent;
-    FarmPlan plan = make_plan(request(workers), folder_.path() / "parts.ptcx",
-                              folder_.path() / "parts.json", options, silent);
+    FarmPlan plan = make_plan(city, folder_.path() / "parts.ptcx", folder_.path() / "parts.json",
+                              options, silent);
     write_plan(plan);
+    return plan;
+  }
+
+  Content build_parts(unsigned workers) {
+    const FarmPlan plan = plan_city(request(workers), options_.parts);
     for (const TaskKind kind : {TaskKind::route, TaskKind::part, TaskKind::join}) {
       if (kind == TaskKind::join) note_sizes(plan);
       run_timed(plan, kind, workers);
@@ -147,20 +150,14 @@ class FarmMeasurement {
   /// Measures the tasks that shade, with a city of their own: a point takes hundreds of times as
   /// long as to build it.
   void measure_shading() {
-    folder_.clear();
     progress_.begin("shade", options_.repeats, "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       folder_.clear();
       BuildRequest city = request(1);
       city.city_points = options_.shaded;
-      FarmOptions options{.parts = 2, .memory_bytes = options_.task_memory};
-      options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
-      options.shading =
-          FarmShading{.target = folder_.path() / "shaded.ply", .request = {}, .ranges = 2};
-      Progress silent;
-      FarmPlan plan = make_plan(city, folder_.path() / "parts.ptcx", folder_.path() / "parts.json",
-                                options, silent);
-      write_plan(plan);
+      const FarmPlan plan = plan_city(
+          city, 2,
+          FarmShading{.target = folder_.path() / "shaded.ply", .request = {}, .ranges = 2});
       for (const TaskKind kind : {TaskKind::route, TaskKind::part, TaskKind::join})
         run_kind(plan, kind, 1);
       run_timed(plan, TaskKind::shade, 1);
@@ -186,29 +183,17 @@ class FarmMeasurement {
 
   /// Runs all tasks of a kind, so many at once.
   void run_kind(const FarmPlan& plan, TaskKind kind, unsigned workers) const {
-    std::atomic<std::size_t> next = 0;
-    std::mutex mutex;
-    std::exception_ptr failure;
-    const auto work = [&] {
-      for (std::size_t i = next++; i < plan.tasks.size(); i = next++) {
-        if (plan.tasks[i].kind != kind) continue;
-        try {
-          Progress silent;
-          RunOptions run = run_;
-          run.threads = 1;
-          run.memory_bytes = options_.task_memory;
-          run_task(plan, plan.tasks[i], run, silent);
-        } catch (...) {
-          const std::lock_guard lock(mutex);
-          failure = std::current_exception();
-        }
-      }
-    };
-    {
-      std::vector<std::jthread> threads;
-      for (unsigned i = 0; i < workers; ++i) threads.emplace_back(work);
+    std::vector<const FarmTask*> tasks;
+    for (const FarmTask& task : plan.tasks) {
+      if (task.kind == kind) tasks.push_back(&task);
     }
-    if (failure) std::rethrow_exception(failure);
+    ThreadPool(workers).for_each(tasks.size(), [&](std::size_t i, unsigned) {
+      Progress silent;
+      RunOptions run = run_;
+      run.threads = 1;
+      run.memory_bytes = options_.task_memory;
+      run_task(plan, *tasks[i], run, silent);
+    });
   }
 
   /// Notes how many bytes are between the stages. @pre routes and parts are done
@@ -297,6 +282,7 @@ void play_all(FarmResult& result, const FarmBenchOptions& options) {
     hardware.nodes = nodes;
     result.by_nodes.push_back(model_row(usual, costs, hardware));
   }
+  hardware.nodes = options.nodes.back();
   for (const std::uint64_t parts : {500U, 2'000U, 5'000U, 10'000U}) {
     for (const std::uint64_t routes : {1'000U, 10'000U, 25'000U}) {
       const FarmLoad load{

@@ -13,7 +13,7 @@
 
 namespace ptc::bench {
 
-/// What the tasks of a plan take, as measured on one core.
+/// What the tasks of a plan take of the core that they run on.
 struct TaskCosts {
   double route_seconds = 0, part_seconds = 0;     ///< of CPU, a point
   double join_seconds = 0;                        ///< of CPU, a part
