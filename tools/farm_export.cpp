@@ -1,4 +1,4 @@
-// Every task of a kind needs all tasks of the kind before it, so that three steps with a dependency
+// Every task of a step needs all tasks of the step before it, so that steps with a dependency
 // between them say what the plan says.
 #include "tools/farm_export.h"
 
@@ -17,8 +17,8 @@ std::string for_parallel(const FarmPlan& plan) {
       "#!/bin/sh\n# Builds {} by GNU parallel. Its options can follow: --jobs 8, --sshlogin a,b\n"
       "set -e\n",
       plan.scene.string());
-  for (const TaskKind kind : kinds_of(plan)) {
-    const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
+  for (const TaskStep& step : steps_of(plan)) {
+    const std::vector<const FarmTask*> tasks = tasks_of(plan, step);
     text += "parallel --halt soon,fail=1 \"$@\" <<'TASKS'\n";
     for (const FarmTask* task : tasks)
       text += line_of(*task) + (tasks.size() > 1 ? " --threads 1\n" : "\n");
@@ -43,9 +43,9 @@ std::string for_slurm(const FarmPlan& plan) {
       "set -e\nmkdir -p {}\n",
       plan.scene.string(), quoted((plan.folder() / "log").string()));
   std::string after, all;
-  for (const TaskKind kind : kinds_of(plan)) {
+  for (const TaskStep& step : steps_of(plan)) {
     std::string jobs;
-    for (const SlurmArray& array : slurm_arrays(plan, kind)) {
+    for (const SlurmArray& array : slurm_arrays(plan, step)) {
       text += lines_of(plan, array, after);
       jobs += ":$" + array.name;
       all += " $" + array.name;
@@ -59,8 +59,8 @@ std::string for_openjd(const FarmPlan& plan) {
   using Json = nlohmann::ordered_json;
   Json steps = Json::array();
   std::string before;
-  for (const TaskKind kind : kinds_of(plan)) {
-    const std::vector<const FarmTask*> tasks = tasks_of(plan, kind);
+  for (const TaskStep& step : steps_of(plan)) {
+    const std::vector<const FarmTask*> tasks = tasks_of(plan, step);
     const FarmTask& first = *tasks.front();
     Json arguments = Json::array();
     for (std::size_t i = 1; i < first.command.size(); ++i) {
@@ -71,15 +71,15 @@ std::string for_openjd(const FarmPlan& plan) {
       arguments.push_back("--threads");
       arguments.push_back("1");
     }
-    Json step{{"name", name_of(kind)}};
-    if (!before.empty()) step["dependencies"] = Json::array({{{"dependsOn", before}}});
-    step["hostRequirements"]["amounts"] =
+    Json entry{{"name", step.name()}};
+    if (!before.empty()) entry["dependencies"] = Json::array({{{"dependsOn", before}}});
+    entry["hostRequirements"]["amounts"] =
         Json::array({{{"name", "amount.worker.memory"}, {"min", mebibytes(first)}}});
-    step["parameterSpace"]["taskParameterDefinitions"] = Json::array(
+    entry["parameterSpace"]["taskParameterDefinitions"] = Json::array(
         {{{"name", "Number"}, {"type", "INT"}, {"range", fmt::format("0-{}", tasks.size() - 1)}}});
-    step["script"]["actions"]["onRun"] = {{"command", first.command[0]}, {"args", arguments}};
-    steps.push_back(std::move(step));
-    before = name_of(kind);
+    entry["script"]["actions"]["onRun"] = {{"command", first.command[0]}, {"args", arguments}};
+    steps.push_back(std::move(entry));
+    before = step.name();
   }
   const Json job{{"specificationVersion", "jobtemplate-2023-09"},
                  {"name", plan.scene.stem().string()},

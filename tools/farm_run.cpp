@@ -46,7 +46,7 @@ class Runner {
         cores_(run.threads > 0 ? run.threads : std::max(1U, std::thread::hardware_concurrency())),
         progress_(progress) {
     for (const FarmTask& task : plan.tasks) {
-      ++counts_[task.kind];
+      ++counts_[task.step];
       if (task.memory_bytes > memory_bytes_) {
         throw LimitError(fmt::format("{} takes up to {} bytes: the least cap is {}", task.name(),
                                      task.memory_bytes, task.memory_bytes));
@@ -63,7 +63,7 @@ class Runner {
         waiting_.push_back(&task);
         continue;
       }
-      ++done_[task.kind];
+      ++done_[task.step];
       ++result_.skipped;
       progress_.advance(1);
     }
@@ -93,7 +93,7 @@ class Runner {
 
   /// Returns how many of the tasks that may run now run beside each other.
   [[nodiscard]] unsigned at_once(const FarmTask& task) const {
-    const std::uint64_t same = counts_.at(task.kind);
+    const std::uint64_t same = counts_.at(task.step);
     const std::uint64_t fit =
         std::max<std::uint64_t>(memory_bytes_ / std::max<std::uint64_t>(task.memory_bytes, 1), 1);
     return static_cast<unsigned>(std::min<std::uint64_t>({same, fit, cores_}));
@@ -142,7 +142,7 @@ class Runner {
     }
     progress_.advance(1);
     if (code == 0) {
-      ++done_[task.kind];
+      ++done_[task.step];
       ++result_.ran;
     } else {
       fail(task, code);
@@ -167,7 +167,7 @@ class Runner {
   Progress& progress_;
   std::vector<const FarmTask*> waiting_;
   std::map<pid_t, const FarmTask*> running_;
-  std::map<TaskKind, std::uint64_t> counts_, done_;  ///< tasks of a kind, and how many are done
+  std::map<TaskStep, std::uint64_t> counts_, done_;  ///< tasks of a step, and how many are done
   std::map<const FarmTask*, unsigned> tries_;        ///< that failed
   std::uint64_t used_bytes_ = 0;
   FarmRun result_;

@@ -1,19 +1,21 @@
 // ptcfarm: builds one scene by many tasks, on one machine or on many.
 //
 //   plan      inputs --> plan.json
-//   route, part, join, shade, collect    one task of a plan
+//   route, part, join, light, ...   one task of a plan
 //   run       all tasks, on this machine
 //   submit, cancel       all tasks, by Slurm
 //   status    how far they are
 //   export    the tasks for another scheduler
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include "engine/io/file/file.h"
 #include "engine/io/file/text_file.h"
+#include "engine/pipeline/budgets.h"
 #include "engine/pipeline/farm/plan.h"
 #include "engine/pipeline/farm/tasks.h"
 #include "format/node_page.h"
@@ -25,6 +27,7 @@
 #include "tools/inputs.h"
 #include "tools/options.h"
 #include "tools/report.h"
+#include "tools/scene_options.h"
 #include "tools/slurm_jobs.h"
 #include "tools/values.h"
 
@@ -35,23 +38,27 @@ constexpr char kPurpose[] =
     "A plan says what is built, where its points are cut into parts, and by which tasks. Each task "
     "is one command line: route sends the points of an input to the parts that they belong to, "
     "part "
-    "sorts and builds the points of one part, join writes the scene file over all parts; shade "
-    "computes the light at a range of its points, and collect writes the shaded points. A task "
-    "that is done does nothing when it is run again, and what a task writes appears whole or not "
-    "at all.\n"
+    "sorts and builds the points of one part, join writes the scene file over all parts; light "
+    "lights the points of a part by the whole scene, and join_light joins the parts again; bounce "
+    "and join_bounce do so for each bounce of the light but the last; shade computes the light at "
+    "a range of the points, and collect writes the shaded points. A task that is done does nothing "
+    "when it is run again, and what a task writes appears whole or not at all.\n"
     "\n"
     "The scene refers to its parts, which stay files of their own. Its tree, and all that is "
     "shaded "
     "from it, has the bits of a container that one machine builds of the same inputs.\n"
     "\n"
-    "Inputs are clouds and containers whose points have normals and radii, and keep the light that "
-    "they have. Build meshes, and clouds that lack something, to a container first.";
+    "Inputs are clouds and containers whose points have normals and radii. They keep the light "
+    "that "
+    "they have, unless lights are given. Build meshes, and clouds that lack something, to a "
+    "container first.";
 constexpr char kExamples[] =
     "  # Plan a scene of eight parts, and run the tasks on this machine\n"
     "  ptcfarm plan tiles/*.ptcx --parts 8 -o town.json\n"
     "  ptcfarm run town.json --memory 8G\n"
-    "  # Shade its points by tasks, too\n"
-    "  ptcfarm plan tiles/*.ptcx --parts 8 --shade lit.ply -o town.json\n"
+    "  # Light its points by tasks, too, and shade them with three bounces\n"
+    "  ptcfarm plan tiles/*.ptcx --sun 200,35 --sky 0.3,0.4,0.6 --shade lit.ply --bounces 3 "
+    "-o town.json\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
     "  # Let a cluster run them\n"
@@ -59,28 +66,22 @@ constexpr char kExamples[] =
     "  # See how far the tasks are, and what failed\n"
     "  ptcfarm status town.json\n";
 
-enum class Action {
-  plan,
-  run,
-  submit,
-  cancel,
-  status,
-  export_tasks,
-  route,
-  part,
-  join,
-  shade,
-  collect
-};
+enum class Action { plan, run, submit, cancel, status, export_tasks, task };
+
+/// What is to be done: an action, or one task of a kind.
+using Chosen = std::pair<Action, ptc::TaskKind>;
 
 struct Arguments {
-  Action action = Action::plan;
+  Chosen action{Action::plan, {}};
   std::vector<std::filesystem::path> files;
   std::filesystem::path output, scene;
   ptc::BuildRequest request;
   ptc::FarmOptions farm;
   ptc::FarmShading shading;
+  ptc::LightArguments lights;
+  ptc::LightRequest lighting;
   std::size_t number = 0;
+  unsigned wave = 0;
   ptc::Scheduler scheduler = ptc::Scheduler::parallel;
   bool slurm = false;
 };
@@ -88,23 +89,19 @@ struct Arguments {
 void declare(ptc::Command& command, Arguments& arguments) {
   CLI::App& app = command.app();
   ptc::BuildRequest& request = arguments.request;
-  ptc::add_choice<Action>(app, "ACTION", arguments.action,
-                          {{"plan", Action::plan},
-                           {"run", Action::run},
-                           {"submit", Action::submit},
-                           {"cancel", Action::cancel},
-                           {"status", Action::status},
-                           {"export", Action::export_tasks},
-                           {"route", Action::route},
-                           {"part", Action::part},
-                           {"join", Action::join},
-                           {"shade", Action::shade},
-                           {"collect", Action::collect}},
+  std::vector<std::pair<std::string, Chosen>> actions{
+      {"plan", {Action::plan, {}}},     {"run", {Action::run, {}}},
+      {"submit", {Action::submit, {}}}, {"cancel", {Action::cancel, {}}},
+      {"status", {Action::status, {}}}, {"export", {Action::export_tasks, {}}}};
+  for (const ptc::TaskKind kind : ptc::kTaskKinds)
+    actions.push_back({ptc::name_of(kind), {Action::task, kind}});
+  ptc::add_choice<Chosen>(app, "ACTION", arguments.action, actions,
                           "plan, run, submit, cancel, status, export, or the kind of a task\n"
                           "plan measures the inputs and writes a plan. run runs its tasks, those "
                           "that are done left out. submit has a cluster run them, and cancel ends "
                           "its jobs. status says how far they are. export writes them for another "
-                          "scheduler. route, part, join, shade and collect run one task.")
+                          "scheduler. route, part, join, light, join_light, bounce, join_bounce, "
+                          "shade and collect run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -157,7 +154,10 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
-                   "Number of the task among those of its kind")
+                   "Number of the task among those of its kind, and of its bounce")
+      ->group(kGroup);
+  ptc::add_integer(app, "--wave", arguments.wave, 0, 1000,
+                   "Number of the bounce whose task it is, from 1 on")
       ->group(kGroup);
 }
 
@@ -178,8 +178,9 @@ void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
                  "Shade COUNT points, evenly spread [default: all]")
       ->group("Shading");
   ptc::add_colour_from(app, shading.request.colour_from)->group("Shading");
-  ptc::add_integer(app, "--bounces", shading.request.bounces, 0, 1,
-                   "Bounces of light; 0 gives occlusion and sky alone")
+  ptc::add_integer(app, "--bounces", shading.request.bounces, 0, 1000,
+                   "Bounces of light; 0 gives occlusion and sky alone\n"
+                   "For each bounce but the last, tasks light all parts once more.")
       ->group("Shading");
   ptc::add_surroundings(app, shading.request.gather.around);
   ptc::add_gather_options(app, shading.request.gather, shading.request.lift);
@@ -207,13 +208,11 @@ nlohmann::ordered_json facts_of(const ptc::FarmPlan& plan) {
 
 /// The command line of a task. The cap is that of the plan.
 std::vector<std::string> command_of(const ptc::FarmPlan& plan, const ptc::FarmTask& task) {
-  return {"ptcfarm",
-          ptc::name_of(task.kind),
-          plan.file.string(),
-          "--number",
-          std::to_string(task.number),
-          "--memory",
-          std::to_string(task.memory_bytes)};
+  std::vector<std::string> words{"ptcfarm", ptc::name_of(task.step.kind), plan.file.string()};
+  if (task.step.wave > 0) words.insert(words.end(), {"--wave", std::to_string(task.step.wave)});
+  words.insert(words.end(), {"--number", std::to_string(task.number), "--memory",
+                             std::to_string(task.memory_bytes)});
+  return words;
 }
 
 ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
@@ -233,6 +232,15 @@ ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& pr
   if (scene.empty()) scene = std::filesystem::path(arguments.output).replace_extension(".ptcx");
   arguments.farm.command = command_of;
   if (!arguments.shading.target.empty()) arguments.farm.shading = arguments.shading;
+  if (arguments.lights.given()) {
+    arguments.lighting.lights = arguments.lights.rig(ptc::up_of_files(request.inputs, request.up),
+                                                     *ptc::texture_store(request.run, scene));
+    arguments.farm.lighting = arguments.lighting;
+  }
+  for (const char* name : {"--sun-rays", "--area-rays"}) {
+    if (command.app().count(name) > 0 && !arguments.farm.lighting)
+      throw CLI::RequiresError(name, "a light, such as --sun");
+  }
   ptc::FarmPlan plan = ptc::make_plan(request, scene, arguments.output, arguments.farm, progress);
   ptc::write_plan(plan);
   return {facts_of(plan),
@@ -262,15 +270,15 @@ ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progres
   return outcome;
 }
 
-ptc::Outcome run_one(const Arguments& arguments, ptc::TaskKind kind, ptc::Command& command,
-                     ptc::Progress& progress) {
+ptc::Outcome run_one(const Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
   const ptc::FarmPlan plan = only_plan(arguments);
+  const ptc::TaskStep step{arguments.action.second, arguments.wave};
   const auto task = std::ranges::find_if(plan.tasks, [&](const ptc::FarmTask& other) {
-    return other.kind == kind && other.number == arguments.number;
+    return other.step == step && other.number == arguments.number;
   });
   if (task == plan.tasks.end()) {
-    throw CLI::ValidationError("--number", fmt::format("the plan has no task {}.{}",
-                                                       ptc::name_of(kind), arguments.number));
+    throw CLI::ValidationError(
+        "--number", fmt::format("the plan has no task {}.{}", step.name(), arguments.number));
   }
   const bool ran = ptc::run_task(plan, *task, command.run_options(), progress);
   return {{{"plan", plan.file.string()}, {"task", task->name()}, {"ran", ran}},
@@ -318,7 +326,7 @@ ptc::Outcome export_tasks(const Arguments& arguments) {
 }
 
 ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& progress) {
-  switch (arguments.action) {
+  switch (arguments.action.first) {
     case Action::plan:
       return plan(arguments, command, progress);
     case Action::run:
@@ -331,18 +339,10 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
       return ptc::farm_status(only_plan(arguments));
     case Action::export_tasks:
       return export_tasks(arguments);
-    case Action::route:
-      return run_one(arguments, ptc::TaskKind::route, command, progress);
-    case Action::part:
-      return run_one(arguments, ptc::TaskKind::part, command, progress);
-    case Action::join:
-      return run_one(arguments, ptc::TaskKind::join, command, progress);
-    case Action::shade:
-      return run_one(arguments, ptc::TaskKind::shade, command, progress);
-    case Action::collect:
+    case Action::task:
       break;
   }
-  return run_one(arguments, ptc::TaskKind::collect, command, progress);
+  return run_one(arguments, command, progress);
 }
 
 }  // namespace
@@ -354,6 +354,8 @@ int main(int argc, char** argv) {
   ptc::add_selection(command.app(), arguments.request.selection);
   declare_tasks(command.app(), arguments);
   declare_container(command.app(), arguments.request);
+  arguments.lights.declare(command.app());
+  ptc::add_shadow_rays(command.app(), arguments.lighting.light_sampling);
   declare_shading(command, arguments.shading);
   return command.run(argc, argv,
                      [&](ptc::Progress& progress) { return act(arguments, command, progress); });

@@ -20,8 +20,8 @@ std::string without_pattern(const std::filesystem::path& path) {
   return text;
 }
 
-std::string name_of_array(TaskKind kind, std::size_t number) {
-  return fmt::format("{}_{}", name_of(kind), number / kMaxArray);
+std::string name_of_array(const TaskStep& step, std::size_t number) {
+  return fmt::format("{}_{}", step.name(), number / kMaxArray);
 }
 
 /// Returns ascending numbers as ranges: "0-3,7".
@@ -42,18 +42,18 @@ std::string quoted(const std::string& word) {
   return text + "'";
 }
 
-std::vector<TaskKind> kinds_of(const FarmPlan& plan) {
-  std::vector<TaskKind> kinds;
+std::vector<TaskStep> steps_of(const FarmPlan& plan) {
+  std::vector<TaskStep> steps;
   for (const FarmTask& task : plan.tasks) {
-    if (kinds.empty() || kinds.back() != task.kind) kinds.push_back(task.kind);
+    if (steps.empty() || steps.back() != task.step) steps.push_back(task.step);
   }
-  return kinds;
+  return steps;
 }
 
-std::vector<const FarmTask*> tasks_of(const FarmPlan& plan, TaskKind kind) {
+std::vector<const FarmTask*> tasks_of(const FarmPlan& plan, const TaskStep& step) {
   std::vector<const FarmTask*> tasks;
   for (const FarmTask& task : plan.tasks) {
-    if (task.kind == kind) tasks.push_back(&task);
+    if (task.step == step) tasks.push_back(&task);
   }
   return tasks;
 }
@@ -71,12 +71,12 @@ std::string line_of(const FarmTask& task, const std::string& number) {
   return line;
 }
 
-std::vector<SlurmArray> slurm_arrays(const FarmPlan& plan, TaskKind kind,
+std::vector<SlurmArray> slurm_arrays(const FarmPlan& plan, const TaskStep& step,
                                      const std::function<bool(const FarmTask&)>& wanted) {
   std::vector<SlurmArray> arrays;
-  for (const FarmTask* task : tasks_of(plan, kind)) {
+  for (const FarmTask* task : tasks_of(plan, step)) {
     if (wanted && !wanted(*task)) continue;
-    const std::string name = name_of_array(kind, task->number);
+    const std::string name = name_of_array(step, task->number);
     if (arrays.empty() || arrays.back().name != name) {
       arrays.push_back({.name = name, .first = task->number / kMaxArray * kMaxArray, .task = task});
     }
@@ -117,7 +117,7 @@ std::string slurm_script(const SlurmArray& array) {
 
 std::filesystem::path slurm_log(const FarmPlan& plan, const FarmTask& task) {
   return plan.folder() / "log" /
-         fmt::format("{}.{}", name_of_array(task.kind, task.number), task.number % kMaxArray);
+         fmt::format("{}.{}", name_of_array(task.step, task.number), task.number % kMaxArray);
 }
 
 }  // namespace ptc

@@ -10,7 +10,7 @@
 
 namespace ptc {
 
-/// An array of jobs, which does tasks of one kind.
+/// An array of jobs, which does tasks of one step.
 struct SlurmArray {
   std::string name;                  ///< "part_0"
   std::size_t first = 0;             ///< number of the task that has index 0
@@ -22,11 +22,11 @@ struct SlurmArray {
 /// Returns a word as a shell takes it.
 [[nodiscard]] std::string quoted(const std::string& word);
 
-/// Returns the kinds of tasks that a plan has, in the order in which they run.
-[[nodiscard]] std::vector<TaskKind> kinds_of(const FarmPlan& plan);
+/// Returns the steps of a plan, in the order in which they run.
+[[nodiscard]] std::vector<TaskStep> steps_of(const FarmPlan& plan);
 
-/// Returns the tasks of a kind.
-[[nodiscard]] std::vector<const FarmTask*> tasks_of(const FarmPlan& plan, TaskKind kind);
+/// Returns the tasks of a step.
+[[nodiscard]] std::vector<const FarmTask*> tasks_of(const FarmPlan& plan, const TaskStep& step);
 
 /// Returns MiB that a task is given: its cap, and what a program takes besides.
 [[nodiscard]] std::uint64_t mebibytes(const FarmTask& task);
@@ -35,10 +35,11 @@ struct SlurmArray {
 /// @param number  takes the place of its number; empty: the number stays
 [[nodiscard]] std::string line_of(const FarmTask& task, const std::string& number = {});
 
-/// Returns arrays for tasks of a kind, as many as the limit of Slurm on the length of one asks for.
+/// Returns arrays for tasks of a step, as many as the limit of Slurm on the length of one asks for.
 /// @param wanted  says whether a task is among them; empty: all are
 [[nodiscard]] std::vector<SlurmArray> slurm_arrays(
-    const FarmPlan& plan, TaskKind kind, const std::function<bool(const FarmTask&)>& wanted = {});
+    const FarmPlan& plan, const TaskStep& step,
+    const std::function<bool(const FarmTask&)>& wanted = {});
 
 /// Returns the options of sbatch for an array, as a shell or a line #SBATCH takes them.
 [[nodiscard]] std::vector<std::string> slurm_options(const FarmPlan& plan, const SlurmArray& array);

@@ -60,7 +60,7 @@ Said run_program(const std::vector<std::string>& words) {
   throw std::system_error(std::make_error_code(std::errc::io_error), program + ": " + text);
 }
 
-/// The array of jobs that was submitted for some tasks of a kind.
+/// The array of jobs that was submitted for some tasks of a step.
 struct Job {
   std::string id;
   std::string name;  ///< of the array
@@ -168,14 +168,14 @@ std::vector<std::string> submit_to_slurm(const FarmPlan& plan) {
                                 plan.file.string(), fmt::join(waiting, ", ")));
   }
 
-  // Submit a kind after the other
+  // Submit a step after the other
   std::vector<Job> jobs;
   std::vector<std::string> all, after;
   const auto undone = [&](const FarmTask& task) { return state_of(plan, task) != TaskState::done; };
   try {
-    for (const TaskKind kind : kinds_of(plan)) {
+    for (const TaskStep& step : steps_of(plan)) {
       std::vector<std::string> ids;
-      for (const SlurmArray& array : slurm_arrays(plan, kind, undone)) {
+      for (const SlurmArray& array : slurm_arrays(plan, step, undone)) {
         ids.push_back(submit(plan, array, after));
         jobs.push_back({ids.back(), array.name});
         write_jobs(plan, jobs);

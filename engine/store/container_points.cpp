@@ -1,5 +1,7 @@
 #include "engine/store/container_points.h"
 
+#include <algorithm>
+
 #include "format/error.h"
 
 namespace ptc {
@@ -7,16 +9,35 @@ namespace ptc {
 std::size_t ContainerPoints::next(std::span<PointRecord> out) {
   std::size_t filled = 0;
   while (filled < out.size()) {
-    if (at_ == scan_.count()) {
-      if (!scan_.next()) break;
-      at_ = 0;
-      if (scan_.points()[0].key < last_) refuse_order();
-    }
+    if (at_ == scan_.count() && !open_page()) break;
     const PointPage points = scan_.points();
     while (at_ < points.size() && filled < out.size()) out[filled++] = points[at_++];
     last_ = out[filled - 1].key;
   }
   return filled;
+}
+
+void ContainerPoints::skip(std::uint64_t points) {
+  while (points > 0) {
+    if (at_ < scan_.count()) {  // on the open page
+      const auto some =
+          static_cast<std::uint32_t>(std::min<std::uint64_t>(points, scan_.count() - at_));
+      at_ += some;
+      points -= some;
+    } else if (scan_.next_count() > 0 && points >= scan_.next_count()) {
+      points -= scan_.next_count();
+      scan_.skip(1);
+    } else if (!open_page()) {
+      return;
+    }
+  }
+}
+
+bool ContainerPoints::open_page() {
+  if (!scan_.next()) return false;
+  at_ = 0;
+  if (scan_.points()[0].key < last_) refuse_order();
+  return true;
 }
 
 // The reader has checked the order within each page. What is built from the stream also relies on

@@ -21,8 +21,13 @@ class ContainerPoints : public PointStream {
   /// @throws FormatError when a page is damaged or its keys precede those of the page before;
   ///         std::system_error
   std::size_t next(std::span<PointRecord> out) override;
+  /// Passes over points; only the page on which it ends is read.
+  /// @throws as next()
+  void skip(std::uint64_t points);
 
  private:
+  /// Reads the next page. @return false at the end
+  bool open_page();
   [[noreturn]] void refuse_order() const;
 
   const ContainerReader& container_;

@@ -396,7 +396,7 @@ class Farm(ProgramTest):
         path = self.here / "farm.json"
         self.plan("--city", "30k")
         text = path.read_text()
-        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 2", "ptcfarm plan 1"),
+        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 3", "ptcfarm plan 2"),
                         text.replace('"kind": "join"', '"kind": "frob"'), text.replace('"points"', '"dots"')):
             path.write_text(changed)
             result = run("ptcfarm", "status", path)
@@ -509,6 +509,62 @@ class Farm(ProgramTest):
         write_ply(cloud, [(*point, i % 251) for i, point in enumerate(ball(900))], CHANNELS)
         self.check_shaded([cloud], ["--ranges", 1, "--colour-from", "occlusion"])
 
+    def test_every_bounce_is_a_wave_of_tasks_with_the_bits_of_one_machine(self):
+        """Parts of the points are lit in batches of 65,536, which go across the ends of the parts."""
+        self.check_shaded(["--city", "150k"], ["--ranges", 2, "--bounces", 3, *self.COARSE])
+        done = {path.name for path in (self.here / "farm.parts" / "done").iterdir()}
+        self.assertLess({"bounce_1.3", "join_bounce_1", "bounce_2.0", "join_bounce_2", "shade.1"}, done)
+
+    def check_lit(self, cloud, lights, *options):
+        """Compares the scene of a plan with lights with what ptclight makes of one machine's container."""
+        one, lit = self.here / "one.ptcx", self.here / "lit.ptcx"
+        self.succeed("ptcbuild", *cloud, *options, "-o", one)
+        self.succeed("ptclight", one, *lights, "-o", lit)
+        self.plan(*cloud, *options, *lights)
+        self.run_plan()
+        self.check_same(lit)
+        verifier.verify(str(self.here / "farm.ptcx"))
+        names = {path.name for path in (self.here / "farm.parts").iterdir() if path.is_file()}
+        self.assertEqual(names, {f"{i}.ptcx{end}" for i in range(4) for end in ("", ".edges")})
+        self.assertNotEqual(self.digest(lit), self.digest(one))
+
+    def test_points_are_lit_with_the_bits_of_one_machine(self):
+        channels = [*CHANNELS, "emission_r", "emission_g", "emission_b"]
+        emitting, plain = self.here / "emitting.ply", self.here / "plain.ply"
+        write_ply(emitting, [(*point, i % 251, *(3 * [9.0 if i % 50 == 0 else 0.0])) for i, point in enumerate(ball(2000))], channels)
+        write_ply(plain, [(*point, i % 251) for i, point in enumerate(ball(2000))], CHANNELS)
+        for cloud, lights, options in (([plain], ["--sun", "200,35", "--sky", "0.3,0.4,0.6"], ["--profile", "exact"]),
+                                       ([emitting], ["--point", "0,3,0,60W", "--light-group", "lamp", "--spot", "2,2,0,-1,-1,0,40,0.2,300cd"], []),
+                                       ([emitting], ["--sky", "0,0,0", "--area-rays", 4], ["--original-order"]),
+                                       (["--city", "150k"], ["--sun", "200,35"], [])):
+            with self.subTest(lights=lights):
+                self.check_lit(cloud, lights, *options)
+
+    def test_a_scene_is_lit_and_shaded_in_waves_and_a_lost_part_comes_back(self):
+        lights = ["--sun", "120,50", "--sky", "0.2"]
+        self.check_shaded([self.cloud, *lights], ["--ranges", 1, "--bounces", 2])
+        scene, part = self.here / "farm.ptcx", self.here / "farm.parts" / "1.ptcx"
+        before = scene.read_bytes(), part.read_bytes()
+        scene.unlink()
+        self.assertEqual(self.run_plan()["ran"], 1)
+        part.unlink()
+        self.run_plan()
+        self.assertEqual((scene.read_bytes(), part.read_bytes()), before)
+
+    def test_light_waits_for_the_scene_and_takes_no_other_picture_of_the_sky(self):
+        sky = self.here / "sky.hdr"
+        head = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n"
+        sky.write_bytes(head + bytes((90, 120, 200, 128)) * 8)
+        plan = self.plan(self.cloud, "--sky", sky)
+        self.assertIn("light.0 needs join", self.fail_with(3, "ptcfarm", "light", self.here / "farm.json", "--number", 0))
+        sky.write_bytes(head + bytes((90, 120, 201, 128)) * 8)
+        message = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(message.returncode, 1)
+        self.assertIn(f"{sky}: the picture changed since it was planned: plan again", message.stderr)
+        self.assertFalse((self.here / "farm.ptcx").exists())
+        self.assertEqual(plan["lighting"]["rig"]["sky"]["map"], str(sky))
+        self.assertIn("--sun-rays requires a light", self.fail_with(2, "ptcfarm", "plan", self.cloud, "--sun-rays", 2, "-o", self.here / "o.json"))
+
     def test_damaged_or_foreign_results_of_ranges_are_refused(self):
         lit = self.here / "lit.ply"
         plan = self.plan("--city", "8k", "--shade", lit, "--ranges", 2, *self.COARSE)
@@ -544,15 +600,16 @@ class Farm(ProgramTest):
     def test_what_a_farm_does_not_shade_is_refused(self):
         plan = ["ptcfarm", "plan", "--city", "8k", "-o", self.here / "farm.json"]
         self.assertIn("must end in", self.fail_with(2, *plan, "--shade", self.here / "lit.ptcx"))
-        self.assertIn("--bounces", self.fail_with(2, *plan, "--shade", self.here / "lit.ply", "--bounces", 2))
+        self.assertIn("--bounces", self.fail_with(2, *plan, "--shade", self.here / "lit.ply", "--bounces", 1001))
         self.assertIn("--shade", self.fail_with(2, *plan, "--bounces", 0))
         self.assertIn("is an input", self.fail_with(2, "ptcfarm", "plan", self.cloud, "-o", self.here / "farm.json",
                                                     "--shade", self.cloud))
         path = self.here / "farm.json"
         whole = json.dumps(self.plan("--city", "8k", "--shade", self.here / "lit.ply", "--ranges", 2))
-        for change, said in ((dict(bounces=2), "one bounce at most"), (dict(ranges=0), "ranges to shade is out of range"),
+        for change, said in ((dict(bounces=2), "those that light and shade"), (dict(bounces=1001), "bounces"), (dict(ranges=0), "ranges to shade is out of range"),
                              (dict(target="lit.ply"), "no absolute path"), (dict(target="/lit.ptcx"), "file of points"),
-                             (dict(solid_angle=-1), "solid_angle"), (dict(sides=2), "no such sides"), (dict(ranges=3), "those that shade")):
+                             (dict(solid_angle=-1), "solid_angle"), (dict(sides=2), "no such sides"),
+                             (dict(ranges=3), "those that light and shade")):
             changed = json.loads(whole)
             changed["shading"].update(change)
             path.write_text(json.dumps(changed))

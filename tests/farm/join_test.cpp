@@ -74,7 +74,7 @@ class Cloud {
       parts.push_back(part(i));
       const Superblock made = build(cuts[i], cuts[i + 1], part(i), &edges);
       std::filesystem::remove(edges_path(part(i)));
-      if (with_edges) write_edges(part(i), made.xxh3, edges);
+      if (with_edges) write_edges(part(i), edges);
     }
     Progress silent;
     static_cast<void>(join_parts(parts, joined(), {}, silent));
@@ -279,7 +279,7 @@ std::string refusal_of_edges(const Cloud& cloud, const std::function<void(TreeEd
   const ContainerReader part(cloud.part(1));
   TreeEdges edges = find_edges(part, ThreadPool(1));
   change(edges);
-  write_edges(cloud.part(1), part.superblock().xxh3, edges);
+  write_edges(cloud.part(1), edges);
   Progress silent;
   try {
     static_cast<void>(

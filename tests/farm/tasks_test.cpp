@@ -56,7 +56,7 @@ struct City {
     for (const FarmTask& task : plan.tasks) run(task.name());
   }
   [[nodiscard]] std::filesystem::path part(std::size_t i) const {
-    return plan.output(TaskKind::part, i);
+    return plan.output({TaskKind::part}, i);
   }
 
   test::TemporaryDirectory directory;
@@ -92,7 +92,7 @@ TEST_CASE("task: a route that is later than the parts leaves no file", "[farm][t
   const City city;
   AtStage others("route", [&] { city.run_all(); });
   CHECK(run_task(city.plan, city.task("route.0"), {}, others));
-  CHECK_FALSE(std::filesystem::exists(city.plan.output(TaskKind::route, 0)));
+  CHECK_FALSE(std::filesystem::exists(city.plan.output({TaskKind::route}, 0)));
   CHECK(state_of(city.plan, city.task("route.0")) == TaskState::done);
 }
 

@@ -15,10 +15,11 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/farm/build_tasks.h"
 #include "engine/pipeline/farm/cuts.h"
 #include "engine/pipeline/farm/plan_checks.h"
 #include "engine/pipeline/farm/plan_json.h"
-#include "engine/pipeline/farm/tasks.h"
+#include "engine/pipeline/farm/plan_tasks.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shade_ranges.h"
 #include "format/checksum.h"
@@ -27,27 +28,24 @@
 namespace ptc {
 namespace {
 
-// Seconds of one core for a point, and bytes of a point in a container: those of a city of 20
-// million points, doubled for slower machines and for channels.
-constexpr double kRouteSeconds = 2.2e-7, kPartSeconds = 7e-7;
-constexpr std::uint64_t kStoredBytes = 26;
 constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
 constexpr std::size_t kMaxParts = 10'000;
-constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;  // of a point, as above
-constexpr std::uint64_t kRangePoints = 1'000'000, kResultBytes = 40;
+constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
 constexpr std::size_t kMaxRanges = 10'000;
 constexpr double kMaxSeconds = 1e9;  // of a task
 
-void check_inputs(const BuildInputs& inputs) {
+/// @param lit  the points are lit anew
+void check_inputs(const BuildInputs& inputs, bool lit) {
   require_request(!inputs.has_meshes(), "inputs",
                   "a farm builds clouds and containers: build the meshes to a container first");
   require_request(!inputs.clouds.scan, "inputs",
                   "a farm builds points with normals and radii: build each cloud that lacks them "
                   "to a container first");
-  require_request(!inputs.relight, "inputs",
-                  "lamps of one input would light another: build these on one machine");
+  require_request(!inputs.relight || lit, "inputs",
+                  "lamps of one input would light another: give the lights of the scene, or build "
+                  "these on one machine");
 }
 
 std::vector<MortonKey> sorted_keys(const std::vector<glm::dvec3>& places, const Frame& frame) {
@@ -65,63 +63,6 @@ std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
   const std::uint64_t groups = plan.row().group_bytes.size();
   const std::uint64_t bytes = plan.points * (groups + 1) * 2 * sizeof(PointRecord);
   return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
-}
-
-/// Adds the tasks that shade ranges of the scene, and one that collects their results.
-void add_shading(FarmPlan& plan, std::uint64_t memory_bytes) {
-  const std::size_t ranges = plan.shading->ranges;
-  const std::uint64_t points = plan.points / ranges;
-  FarmTask collect{.kind = TaskKind::collect,
-                   .after = TaskKind::shade,
-                   .inputs = {plan.scene, plan.folder() / "shade.*"},
-                   .outputs = {plan.shading->target},
-                   .memory_bytes = memory_bytes,
-                   .disk_bytes = plan.points * 2 * kResultBytes,
-                   .seconds = static_cast<double>(plan.points) * kCollectSeconds};
-  for (std::size_t i = 0; i < ranges; ++i) {
-    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::shade, .number = i});
-    task.after = TaskKind::join;
-    task.inputs = {plan.scene};
-    task.outputs = {plan.output(TaskKind::shade, i)};
-    task.memory_bytes = memory_bytes;
-    task.disk_bytes = points * kResultBytes;
-    task.seconds = static_cast<double>(points) * kShadeSeconds;
-  }
-  plan.tasks.push_back(std::move(collect));
-}
-
-void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
-  // Route each input
-  const std::uint64_t row = plan.row().bytes();
-  for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
-    const FarmInput& input = plan.inputs[i];
-    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::route, .number = i});
-    if (!input.path.empty()) task.inputs = {input.path};
-    task.outputs = {plan.output(TaskKind::route, i)};
-    task.memory_bytes = memory_bytes;
-    task.disk_bytes = input.points * row;
-    task.seconds = static_cast<double>(input.points) * kRouteSeconds;
-  }
-
-  // Build each range of all of them, and join the parts
-  FarmTask join{.kind = TaskKind::join,
-                .after = TaskKind::part,
-                .inputs = {plan.folder() / "*.ptcx"},
-                .outputs = {plan.scene},
-                .memory_bytes = memory_bytes};
-  for (std::size_t i = 0; i < plan.parts(); ++i) {
-    FarmTask& task = plan.tasks.emplace_back(FarmTask{.kind = TaskKind::part, .number = i});
-    task.after = TaskKind::route;
-    task.inputs = {plan.folder() / "route.*"};
-    task.outputs = {plan.output(TaskKind::part, i)};
-    task.memory_bytes = memory_bytes;
-    task.disk_bytes = plan.points / plan.parts() * kStoredBytes;
-    task.seconds = static_cast<double>(plan.points / plan.parts()) * kPartSeconds;
-  }
-  join.disk_bytes = plan.parts() * 4096;
-  join.seconds = 0.01 * static_cast<double>(plan.parts());
-  plan.tasks.push_back(std::move(join));
-  if (plan.shading) add_shading(plan, memory_bytes);
 }
 
 void require(const FarmPlan& plan, bool holds, const char* rule) {
@@ -167,6 +108,10 @@ void check_plan(const FarmPlan& plan) {
   require(plan,
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
+  if (plan.lighting) {
+    check_ranges(*plan.lighting);
+    check_lights(plan.lighting->lights.value());
+  }
   if (!plan.shading) return;
   require(plan, plan.shading->target.is_absolute() && !has_control_characters(plan.shading->target),
           "the shaded points are no absolute path without control characters");
@@ -180,13 +125,14 @@ void check_plan(const FarmPlan& plan) {
 void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
   constexpr char kTasks[] =
       "the tasks are not a route for each input, a part for each range, and a join, nor those that "
-      "shade";
+      "light and shade";
   const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
   const std::size_t shading = plan.shading ? plan.shading->ranges + 1 : 0;
-  require(plan, said.size() == plan.inputs.size() + plan.parts() + 1 + shading, kTasks);
+  const std::size_t builds = 1 + (plan.lighting ? 1 : 0) + plan.waves();
+  require(plan, said.size() == plan.inputs.size() + builds * (plan.parts() + 1) + shading, kTasks);
   add_tasks(plan, 0);
   const auto same = [](const FarmTask& a, const FarmTask& b) {
-    return a.kind == b.kind && a.number == b.number;
+    return a.step == b.step && a.number == b.number;
   };
   require(plan, std::ranges::equal(said, plan.tasks, same), kTasks);
   for (std::size_t i = 0; i < said.size(); ++i) {
@@ -227,47 +173,6 @@ std::vector<glm::dvec3> sample_city(std::uint64_t points) {
 
 }  // namespace
 
-const char* name_of(TaskKind kind) noexcept {
-  switch (kind) {
-    case TaskKind::route:
-      return "route";
-    case TaskKind::part:
-      return "part";
-    case TaskKind::join:
-      return "join";
-    case TaskKind::shade:
-      return "shade";
-    case TaskKind::collect:
-      break;
-  }
-  return "collect";
-}
-
-std::string FarmTask::name() const {
-  const bool one = kind == TaskKind::join || kind == TaskKind::collect;
-  return one ? name_of(kind) : fmt::format("{}.{}", name_of(kind), number);
-}
-
-std::filesystem::path FarmPlan::folder() const {
-  return scene.parent_path() / (scene.stem().string() + ".parts");
-}
-
-std::filesystem::path FarmPlan::output(TaskKind kind, std::size_t number) const {
-  switch (kind) {
-    case TaskKind::route:
-      return folder() / fmt::format("route.{}", number);
-    case TaskKind::part:
-      return folder() / fmt::format("{}.ptcx", number);
-    case TaskKind::shade:
-      return folder() / fmt::format("shade.{}", number);
-    case TaskKind::collect:
-      return shading.value().target;
-    case TaskKind::join:
-      break;
-  }
-  return scene;
-}
-
 AttributePlan FarmPlan::attributes() const {
   AttributePlan plan;
   for (const FarmInput& input : inputs) {
@@ -299,7 +204,12 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   FarmPlan plan{.file = std::filesystem::absolute(file),
                 .scene = std::filesystem::absolute(scene),
                 .request = request,
+                .lighting = options.lighting,
                 .shading = options.shading};
+  if (plan.lighting) {
+    check_ranges(*plan.lighting);
+    check_lights(plan.lighting->lights.value());
+  }
   if (plan.shading) {
     plan.shading->target = std::filesystem::absolute(plan.shading->target);
     check_shade_by_ranges(plan.shading->request, plan.shading->target);
@@ -322,7 +232,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   StageSeconds seconds;
   const BuildInputs inputs =
       read_inputs(request, BoundsFrom::points, nullptr, limits, seconds, progress);
-  check_inputs(inputs);
+  check_inputs(inputs, plan.lighting.has_value());
   if (inputs.bounds.empty()) throw DataError("the inputs have no points");
 
   // Write down what follows from them

@@ -7,11 +7,21 @@
 //   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
 //   collect          the light of all ranges --> shaded points          shaded.ply
 //
+// A scene that is lit is built under another name first, and so is one for each bounce but the
+// last:
+//
+//   part.0 ...  join           as above                      scene.parts/unlit.0.ptcx, unlit.ptcx
+//   light.0 ...                a part, lit by the scene      scene.parts/0.ptcx, its edges
+//   join_light                 edges of all lit parts        scene.ptcx
+//   bounce_1.0 ...             a part, lit once more         scene.parts/bounce_1.0.ptcx, its edges
+//   join_bounce_1              edges of all these parts      scene.parts/bounce_1.ptcx
+//
 // Every task is one command line. It can be run again at any time, publishes what it makes by
 // rename, and leaves a mark when it is done, by which it does nothing the next time.
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -24,6 +34,7 @@
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/farm/input_state.h"
 #include "engine/pipeline/farm/range_file.h"
+#include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/shade/shade_container.h"
 #include "engine/scene/procedural/city.h"
 #include "format/morton.h"
@@ -32,17 +43,33 @@
 namespace ptc {
 
 /// The kinds of tasks, in the order in which they run.
-enum class TaskKind { route, part, join, shade, collect };
+enum class TaskKind { route, part, join, light, join_light, bounce, join_bounce, shade, collect };
+
+/// All kinds.
+inline constexpr std::array kTaskKinds{
+    TaskKind::route,       TaskKind::part,       TaskKind::join,
+    TaskKind::light,       TaskKind::join_light, TaskKind::bounce,
+    TaskKind::join_bounce, TaskKind::shade,      TaskKind::collect};
 
 /// Returns the name of a kind, "route".
 [[nodiscard]] const char* name_of(TaskKind kind) noexcept;
 
+/// Tasks that may run at the same time: those of one kind, and of one bounce.
+struct TaskStep {
+  TaskKind kind = TaskKind::route;
+  unsigned wave = 0;  ///< number of the bounce, from 1 on; 0 for other kinds
+
+  /// Returns its name, "part" or "bounce_2".
+  [[nodiscard]] std::string name() const;
+  auto operator<=>(const TaskStep&) const = default;
+};
+
 /// One task of a plan.
 struct FarmTask {
-  TaskKind kind = TaskKind::route;
-  std::size_t number = 0;                     ///< among the tasks of its kind
+  TaskStep step;
+  std::size_t number = 0;                     ///< among the tasks of its step
   std::vector<std::string> command;           ///< from the program on
-  std::optional<TaskKind> after;              ///< all tasks of this kind must be done before
+  std::optional<TaskStep> after;              ///< all its tasks must be done before
   std::vector<std::filesystem::path> inputs;  ///< "route.*" stands for the files of all routes
   std::vector<std::filesystem::path> outputs;
   std::uint64_t memory_bytes = 0;  ///< the cap that it is given
@@ -82,6 +109,7 @@ struct FarmOptions {
   TaskCommand command;
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
+  std::optional<LightRequest> lighting;                 ///< as of FarmPlan
   std::optional<FarmShading> shading;
 };
 
@@ -97,6 +125,9 @@ struct FarmPlan {
   std::uint64_t points = 0;  ///< expected
   Meta meta;                 ///< record of each part, complete
   std::vector<MortonKey> cuts;
+  /// How the points of the scene are lit anew, when they are: lights are given, the scene is that
+  /// of the plan. A plan that was read has no picture of the sky, but its path.
+  std::optional<LightRequest> lighting;
   std::optional<FarmShading> shading;  ///< with the number of ranges
   std::vector<FarmTask> tasks;
 
@@ -104,8 +135,10 @@ struct FarmPlan {
   [[nodiscard]] std::size_t parts() const noexcept { return cuts.size() + 1; }
   /// Returns the folder of the parts, "scene.parts".
   [[nodiscard]] std::filesystem::path folder() const;
+  /// Returns how many bounces are made of all points before a range is shaded.
+  [[nodiscard]] unsigned waves() const noexcept;
   /// Returns the file that a task writes.
-  [[nodiscard]] std::filesystem::path output(TaskKind kind, std::size_t number) const;
+  [[nodiscard]] std::filesystem::path output(const TaskStep& step, std::size_t number) const;
   /// Returns the channels as the inputs have them.
   /// @throws DataError when they do not give the channels of the record
   [[nodiscard]] AttributePlan attributes() const;
@@ -116,11 +149,12 @@ struct FarmPlan {
 /// Measures the inputs and plans the tasks. Points are read once.
 /// @param request  what to build. Inputs are clouds and containers whose points have normals and
 ///                 radii and keep the light that they have, or the city
-/// @throws RequestError for meshes, for points that lack normals or radii, for lamps that would
-///         light clouds, and for fields that a farm does not take; when the scene or the plan is an
-///         input or a part of one, when one lies in the folder of the parts, and for paths with
-///         control characters; DataError when an input changes meanwhile; LimitError when the cap
-///         of the tasks is too small; as build_container()
+/// @throws RequestError for meshes, for points that lack normals or radii, for lamps of one input
+///         that would light another where no lights are given, and for fields that a farm does not
+///         take; when the scene or the plan is an input or a part of one, when one lies in the
+///         folder of the parts, and for paths with control characters; DataError when an input
+///         changes meanwhile; LimitError when the cap of the tasks is too small; as
+///         build_container()
 [[nodiscard]] FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& scene,
                                  const std::filesystem::path& file, const FarmOptions& options,
                                  Progress& progress);

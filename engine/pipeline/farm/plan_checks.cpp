@@ -44,7 +44,8 @@ void check_plan_request(const BuildRequest& request) {
   require_request(request.city_points == 0 || (request.inputs.empty() && !request.original_order),
                   "city_points", "`city_points` excludes files and the order of inputs");
   require_request(!request.lights, "lights",
-                  "a farm builds points with the light that they have: light them afterwards");
+                  "a farm builds points with the light that they have, and lights them in tasks of "
+                  "their own");
 }
 
 bool has_control_characters(const std::filesystem::path& path) {

@@ -1,18 +1,20 @@
 #include "engine/pipeline/farm/plan_json.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "engine/base/error.h"
+#include "engine/pipeline/scene_record.h"
 
 namespace ptc {
 namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr char kFormat[] = "ptcfarm plan 2";
+constexpr char kFormat[] = "ptcfarm plan 3";
 
 OrderedJson to_json(const std::filesystem::path& path) {
   return path.string();
@@ -134,6 +136,20 @@ BuildRequest request_of(const OrderedJson& json) {
   return request;
 }
 
+OrderedJson to_json(const LightRequest& lighting) {
+  return {{"rig", OrderedJson::parse(lights_record(lighting.lights.value()))},
+          {"sun_rays", lighting.light_sampling.sun_rays},
+          {"area_rays", lighting.light_sampling.area_rays}};
+}
+
+LightRequest lighting_of(const OrderedJson& json) {
+  LightRequest lighting;
+  lighting.lights = light_rig_from_json(json.at("rig").dump());
+  lighting.light_sampling.sun_rays = json.at("sun_rays");
+  lighting.light_sampling.area_rays = json.at("area_rays");
+  return lighting;
+}
+
 OrderedJson to_json(const FarmShading& shading) {
   const ShadeRequest& request = shading.request;
   const GatherOptions& gather = request.gather;
@@ -182,10 +198,11 @@ FarmShading shading_of(const OrderedJson& json) {
 
 OrderedJson to_json(const FarmTask& task) {
   return {{"name", task.name()},
-          {"kind", name_of(task.kind)},
+          {"kind", name_of(task.step.kind)},
+          {"wave", task.step.wave},
           {"number", task.number},
           {"command", task.command},
-          {"after", task.after ? OrderedJson(name_of(*task.after)) : OrderedJson()},
+          {"after", task.after ? OrderedJson(task.after->name()) : OrderedJson()},
           {"inputs", to_json(task.inputs)},
           {"outputs", to_json(task.outputs)},
           {"memory_bytes", task.memory_bytes},
@@ -197,11 +214,9 @@ OrderedJson to_json(const FarmTask& task) {
 FarmTask task_of(const OrderedJson& json) {
   FarmTask task;
   const auto kind = json.at("kind").get<std::string>();
-  for (const TaskKind known :
-       {TaskKind::route, TaskKind::part, TaskKind::join, TaskKind::shade, TaskKind::collect}) {
-    if (kind == name_of(known)) task.kind = known;
-  }
-  if (kind != name_of(task.kind)) throw DataError("there are no tasks `" + kind + "`");
+  const auto known = std::ranges::find(kTaskKinds, kind, name_of);
+  if (known == kTaskKinds.end()) throw DataError("there are no tasks `" + kind + "`");
+  task.step = {*known, json.at("wave")};
   task.number = json.at("number");
   task.memory_bytes = json.at("memory_bytes");
   task.disk_bytes = json.at("disk_bytes");
@@ -239,6 +254,7 @@ FarmPlan plan_of(const OrderedJson& json) {
   plan.meta = {channels_of(json.at("channels")),
                json.at("texts").get<std::map<std::string, std::string>>()};
   for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
+  if (json.contains("lighting")) plan.lighting = lighting_of(json.at("lighting"));
   if (json.contains("shading")) plan.shading = shading_of(json.at("shading"));
   for (const OrderedJson& task : json.at("tasks")) plan.tasks.push_back(task_of(task));
   return plan;
@@ -270,6 +286,7 @@ std::string plan_to_json(const FarmPlan& plan) {
                    {"texts", plan.meta.text},
                    {"cuts", cuts},
                    {"tasks", tasks}};
+  if (plan.lighting) json["lighting"] = to_json(*plan.lighting);
   if (plan.shading) json["shading"] = to_json(*plan.shading);
   return json.dump(1) + "\n";
 }

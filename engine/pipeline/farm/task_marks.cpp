@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -64,12 +63,30 @@ bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& need
   return *has_output;
 }
 
+std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task) {
+  switch (task.step.kind) {
+    case TaskKind::route:
+      return TaskKind::part;
+    case TaskKind::part:
+    case TaskKind::join:
+      return plan.lighting ? std::optional(TaskKind::light) : std::nullopt;
+    case TaskKind::bounce:
+    case TaskKind::join_bounce:
+    case TaskKind::shade:
+      return TaskKind::collect;
+    case TaskKind::light:
+    case TaskKind::join_light:
+    case TaskKind::collect:
+      break;
+  }
+  return std::nullopt;
+}
+
 bool is_spent(const FarmPlan& plan, const FarmTask& task) {
-  if (task.kind != TaskKind::route && task.kind != TaskKind::shade) return false;
-  const TaskKind user = task.kind == TaskKind::route ? TaskKind::part : TaskKind::collect;
-  return std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
-    return other.kind != user || is_done(plan, other);
-  });
+  const std::optional<TaskKind> user = last_user(plan, task);
+  return user && std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
+           return other.step.kind != *user || is_done(plan, other);
+         });
 }
 
 TaskState state_of(const FarmPlan& plan, const FarmTask& task) {

@@ -4,6 +4,7 @@
 //   scene.parts/failed/part.3   what it said
 #pragma once
 
+#include <optional>
 #include <string>
 #include <system_error>
 
@@ -42,8 +43,9 @@ class NotYet : public std::system_error {
 /// not be seen from this machine yet.
 /// @throws as fail_unseen() when the mark is not seen
 [[nodiscard]] bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed);
-/// Says whether no task needs the output of a task any more: that of a route when the parts are
-/// done, that of a range when the results are collected.
+/// Returns the kind of tasks that need the output of a task last; nothing when it stays.
+[[nodiscard]] std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task);
+/// Says whether no task needs the output of a task any more, because its last users are done.
 [[nodiscard]] bool is_spent(const FarmPlan& plan, const FarmTask& task);
 
 }  // namespace ptc

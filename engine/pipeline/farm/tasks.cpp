@@ -3,308 +3,38 @@
 #include "engine/pipeline/farm/tasks.h"
 
 #include <algorithm>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "engine/base/error.h"
-#include "engine/base/memory_budget.h"
-#include "engine/io/cloud/record.h"
 #include "engine/io/file/file.h"
 #include "engine/io/file/temporary_name.h"
-#include "engine/octree/build_pages.h"
-#include "engine/octree/rounding.h"
-#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
-#include "engine/pipeline/build/build_record.h"
-#include "engine/pipeline/build/placed_points.h"
-#include "engine/pipeline/build/point_marks.h"
-#include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/farm/build_tasks.h"
+#include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/parts/join_parts.h"
 #include "engine/pipeline/parts/part_edges.h"
 #include "engine/pipeline/shade/shade_ranges.h"
-#include "engine/scene/procedural/city.h"
+#include "engine/scene/light/sky_map.h"
 #include "engine/store/reader.h"
-#include "engine/store/writer.h"
 
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
-
-constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
-
-/// Returns the bytes that a route has for its ranges.
-/// @param field  as for MemoryBudget
-std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t cap, const char* field) {
-  MemoryBudget budget(cap, "a route of this plan", field);
-  budget.charge("buffers", kBufferBytes);
-  return budget.rest("the ranges", RangeWriter::least_memory(plan.parts(), plan.row()));
-}
-
-/// Returns the bytes that a part has for its sorts.
-std::uint64_t sorts_bytes(const FarmPlan& plan, std::uint64_t cap, unsigned threads,
-                          const char* field) {
-  MemoryBudget budget(cap, "a part of this plan", field);
-  budget.charge("buffers", kBufferBytes);
-  budget.charge("pages that are written",
-                ContainerWriter::writing_bytes(plan.request.page_shift, threads));
-  budget.charge("node pages that wait", held_pages_bytes(plan.request.page_shift));
-  return budget.rest("the sort", kMinSortBytes * (plan.row().group_bytes.size() + 1));
-}
-
-/// Sends the points of one input to their ranges.
-class Route {
- public:
-  Route(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress)
-      : plan_(plan),
-        number_(task.number),
-        executor_(run.threads),
-        progress_(progress),
-        attributes_(plan.attributes()),
-        values_(attributes_.groups()),
-        writer_(plan.output(TaskKind::route, task.number), plan.id, plan.cuts, plan.row(),
-                ranges_bytes(plan, run.memory_bytes, kCapOfRun)) {}
-
-  void run() {
-    const FarmInput& input = plan_.inputs[number_];
-    progress_.begin("route", input.points, "points");
-    if (input.path.empty()) {
-      feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput);
-    } else {
-      require_unchanged(input.states);
-      for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
-      const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
-      require_planned(file.info.channels == input.channels);
-      const std::uint64_t before = points_;
-      feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
-      require_planned(points_ - before == input.points);
-      require_unchanged(input.states);  // nor while it was read
-    }
-    writer_.finish();
-    progress_.end();
-  }
-
- private:
-  /// Refuses an input that is not as the plan says.
-  void require_planned(bool holds) const {
-    if (holds) return;
-    throw DataError(plan_.inputs[number_].path.string() +
-                    ": the file changed since it was planned: plan again");
-  }
-
-  /// Returns the input's number among those that have channels.
-  [[nodiscard]] std::size_t input_number() const {
-    return static_cast<std::size_t>(std::count_if(
-        plan_.inputs.begin(), plan_.inputs.begin() + static_cast<std::ptrdiff_t>(number_),
-        [](const FarmInput& input) { return !input.channels.empty(); }));
-  }
-
-  void feed(PointSource& source, std::size_t input) {
-    while (const std::size_t count = source.next(surfels_)) {
-      const auto records = std::span(records_).first(count);
-      executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) records[i] = to_record(surfels_[i], plan_.frame);
-      });
-      for (std::size_t group = 0; group < values_.size(); ++group) {
-        values_[group].resize(count);
-        attributes_.fill(input, source.attributes(), points_, group, values_[group]);
-      }
-      writer_.add(records, values_);
-      points_ += count;
-      progress_.advance(count);
-    }
-  }
-
-  const FarmPlan& plan_;
-  std::size_t number_;
-  const ThreadPool executor_;
-  Progress& progress_;
-  AttributePlan attributes_;
-  std::vector<std::vector<PointRecord>> values_;
-  RangeWriter writer_;
-  std::vector<Surfel> surfels_ = std::vector<Surfel>(kBlock);
-  std::vector<PointRecord> records_ = std::vector<PointRecord>(kBlock);
-  std::uint64_t points_ = 0;  ///< number of the next point among all inputs
-};
-
-/// Refuses points that rounding has moved out of their part: then the part before would have to
-/// know them (spec/parts.md#writing).
-class WithinPart : public PointStream {
- public:
-  WithinPart(PointStream& points, const MortonKey& first, std::string name)
-      : points_(points), first_(first), name_(std::move(name)) {}
-  std::size_t next(std::span<PointRecord> out) override {
-    const std::size_t count = points_.next(out);
-    if (count > 0 && out[0].key < first_) {
-      throw DataError(name_ +
-                      ": a disc is so wide that rounding moves its point to the part "
-                      "before: plan a profile that does not round");
-    }
-    return count;
-  }
-
- private:
-  PointStream& points_;
-  MortonKey first_;
-  std::string name_;
-};
-
-/// Sorts and builds a range of all inputs.
-class Part {
- public:
-  Part(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress)
-      : plan_(plan),
-        number_(task.number),
-        target_(plan.output(TaskKind::part, task.number)),
-        run_(run),
-        fit_(threads_that_fit(run,
-                              [&](unsigned threads) {
-                                return sorts_bytes(plan, run.memory_bytes, threads, kCapOfRun);
-                              })),
-        executor_(fit_.threads),
-        progress_(progress),
-        attributes_(plan.attributes()) {}
-
-  /// Builds the part. @return  whether it has points; one without has no file
-  [[nodiscard]] bool run() {
-    open_routes();
-    const std::uint64_t points = count();
-    if (points == 0) {  // a scene has no part without points
-      std::filesystem::remove(target_);
-      std::filesystem::remove(edges_path(target_));
-      return false;
-    }
-    progress_.begin("sort", points, "points");
-    sort(points);
-    progress_.begin("build", points, "points");
-    build();
-    progress_.end();
-    return true;
-  }
-
- private:
-  void open_routes() {
-    for (std::size_t i = 0; i < plan_.inputs.size(); ++i)
-      routes_.push_back(plan_.output(TaskKind::route, i));
-  }
-
-  [[nodiscard]] RangeReader open(const std::filesystem::path& route) const {
-    return {route, plan_.id, plan_.row()};
-  }
-
-  [[nodiscard]] std::uint64_t count() const {
-    std::uint64_t points = 0;
-    for (const auto& route : routes_) points += open(route).points(range());
-    return points;
-  }
-
-  [[nodiscard]] std::uint32_t range() const { return static_cast<std::uint32_t>(number_); }
-
-  /// Gives the memory to the sorts: those of values get equal shares.
-  void sort(std::uint64_t points) {
-    const std::size_t groups = attributes_.groups();
-    const SortOptions options{.memory_bytes = fit_.bytes / (groups + 1),
-                              .temp_dirs = temp_dirs(run_, target_),
-                              .expected = points,
-                              .emits = plan_.emits};
-    const std::vector<MortonKey> sample = keys_of_range(points);
-    sorter_ = std::make_unique<ExternalSorter>(options, executor_, sample);
-    sorts_.emplace(attributes_, options, std::span<const std::filesystem::path>(), executor_,
-                   sample);
-    std::vector<PointRecord> values;
-    for (const auto& route : routes_) {
-      RangeReader reader = open(route);
-      reader.open(range());
-      while (reader.next()) {
-        sorter_->add(reader.block());
-        for (std::size_t group = 0; group < groups; ++group) {
-          reader.values(group, values);
-          sorts_->add(group, values);
-        }
-        progress_.advance(reader.block().size());
-      }
-    }
-  }
-
-  /// Returns keys of points that are spread over the range, for the splitters of the sort.
-  [[nodiscard]] std::vector<MortonKey> keys_of_range(std::uint64_t points) const {
-    constexpr std::uint64_t kKeys = 1 << 14;
-    if (points * 2 * sizeof(PointRecord) <= run_.memory_bytes / 4) return {};  // all fit in memory
-    std::vector<MortonKey> keys;
-    for (const auto& route : routes_) {
-      RangeReader reader = open(route);
-      reader.open(range());
-      while (reader.next()) {
-        for (std::size_t i = 0; i < reader.block().size(); i += points / kKeys + 1)
-          keys.push_back(reader.block()[i].key);
-      }
-    }
-    return keys;
-  }
-
-  void build() {
-    // Chain the streams
-    const MortonKey first = number_ > 0 ? plan_.cuts[number_ - 1] : MortonKey{};
-    const auto sorted = sorter_->finish();
-    PointStream* points = sorted.get();
-    std::unique_ptr<PointStream> unique, rounded;
-    if (plan_.request.remove_duplicates) {
-      unique = unique_points(*points);
-      points = unique.get();
-    }
-    if (is_rounded(plan_.request.profile)) {
-      rounded = round_points(*points, plan_.frame.unit(), executor_);
-      points = rounded.get();
-    }
-    WithinPart within(*points, first, target_.string());
-
-    // Write the pages, the values, and the edges of the tree
-    BuildPlan made{.frame = plan_.frame, .meta = plan_.meta, .emits = plan_.emits};
-    ContainerWriter writer(target_, {.page_shift = plan_.request.page_shift,
-                                     .codec = codec_of(plan_.request.profile),
-                                     .uuid = content_uuid(*sorter_, *sorts_, plan_.frame,
-                                                          plan_.request, plan_.meta, {}),
-                                     .frame = plan_.frame,
-                                     .point_bytes = made.point_bytes()});
-    TreeEdges edges;
-    const Superblock superblock =
-        build_pages(within, writer, plan_.request.tree, executor_, progress_, {}, &edges);
-    write_values(superblock.points, writer);
-    static_cast<void>(writer.finish(plan_.meta, superblock));
-    write_edges(target_, ContainerReader(target_).superblock().xxh3, edges);
-  }
-
-  void write_values(std::uint64_t points, ContainerWriter& writer) {
-    for (std::size_t group = 0; group < sorts_->size(); ++group) {
-      const auto sorted = sorts_->finish(group);
-      std::unique_ptr<PointStream> unique;
-      if (plan_.request.remove_duplicates) unique = unique_points(*sorted);
-      write_attribute_pages(unique ? *unique : *sorted,
-                            static_cast<std::uint8_t>(kFirstInputGroup + group),
-                            plan_.meta.channels, points, writer);
-    }
-  }
-
-  const FarmPlan& plan_;
-  std::size_t number_;
-  std::filesystem::path target_;
-  const RunOptions& run_;
-  ThreadsThatFit fit_;  ///< with the bytes of the sorts
-  const ThreadPool executor_;
-  Progress& progress_;
-  AttributePlan attributes_;
-  std::vector<std::filesystem::path> routes_;
-  std::unique_ptr<ExternalSorter> sorter_;
-  std::optional<AttributeSorts> sorts_;
-};
-
-/// Removes what the routes wrote, and temporary files that killed tasks have left. A second process
-/// of a task that is done may still need them: its task ends well for all that (run_task()).
-void remove_leftovers(const FarmPlan& plan) {
+/// Removes what nobody needs when the tasks of a kind are done, and temporary files that killed
+/// tasks have left. A second process of a task that is done may still need them: its task ends well
+/// for all that (run_task()).
+void remove_leftovers(const FarmPlan& plan, TaskKind user) {
   std::error_code gone;
   for (const FarmTask& task : plan.tasks) {
-    if (task.kind == TaskKind::route) std::filesystem::remove(task.outputs.at(0), gone);
+    if (last_user(plan, task) != user) continue;
+    const std::filesystem::path& output = task.outputs.at(0);
+    std::filesystem::remove(output, gone);
+    if (task.step.kind == TaskKind::part || task.step.kind == TaskKind::bounce)
+      std::filesystem::remove(edges_path(output), gone);
   }
   for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
     if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
@@ -315,11 +45,40 @@ void remove_leftovers(const FarmPlan& plan) {
 void join(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
   std::vector<std::filesystem::path> parts;
   for (const FarmTask& part : plan.tasks) {
-    if (part.kind == TaskKind::part && has_output(plan, task, part))
+    if (part.step == task.after && has_output(plan, task, part))
       parts.push_back(part.outputs.at(0));
   }
-  static_cast<void>(join_parts(parts, plan.scene, run, progress));
-  remove_leftovers(plan);
+  static_cast<void>(join_parts(parts, task.outputs.at(0), run, progress));
+}
+
+/// Returns the index of a plan's part among those of a scene; nothing when it has no points.
+/// @param step  whose tasks wrote the parts
+std::optional<std::size_t> index_of(const FarmPlan& plan, const TaskStep& step, std::size_t number,
+                                    const std::filesystem::path& scene) {
+  const std::string name = plan.output(step, number).filename();
+  const PartList list = ContainerReader(scene, ContainerReader::OpenParts::no).read_parts();
+  const auto found = std::ranges::find_if(list.parts(), [&](const PartRecord& part) {
+    return std::filesystem::path(part.name).filename() == name;
+  });
+  if (found == list.parts().end()) return std::nullopt;
+  return static_cast<std::size_t>(found - list.parts().begin());
+}
+
+/// Lights a part. @return  whether it has points
+bool light(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
+  LightRequest request = plan.lighting.value();
+  request.scene = plan.output({TaskKind::join}, 0);
+  request.run = run;
+  const std::filesystem::path& target = task.outputs.at(0);
+  const std::optional<std::size_t> part =
+      index_of(plan, {TaskKind::part}, task.number, request.scene);
+  if (!part) return false;
+  Sky& sky = request.lights.value().sky;
+  const auto store = texture_store(run, target);
+  if (load_sky_map(sky, directory_of(plan.file), *store) == SkyMap::changed)
+    throw DataError(sky.map_path + ": the picture changed since it was planned: plan again");
+  static_cast<void>(light_part(request, *part, target, progress));
+  return true;
 }
 
 ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
@@ -329,35 +88,64 @@ ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
   return request;
 }
 
-/// Writes the shaded points, and removes the results of the ranges.
+/// Adds a bounce to the light of a part. @return  whether it has points
+bool bounce(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
+  ShadeRequest request = shading_of(plan, run);
+  const TaskStep parts{plan.lighting ? TaskKind::light : TaskKind::part};
+  const std::optional<std::size_t> part = index_of(plan, parts, task.number, request.scene);
+  if (!part) return false;
+  request.bounces = task.step.wave;
+  if (task.step.wave > 1)
+    request.bounced = plan.output({TaskKind::join_bounce, task.step.wave - 1}, 0);
+  shade_part(request, *part, task.outputs.at(0), progress);
+  return true;
+}
+
+void shade(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
+  ShadeRequest request = shading_of(plan, run);
+  if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
+  shade_range(request, {task.number, plan.shading->ranges}, plan.id, task.outputs.at(0), progress);
+}
+
+/// Writes the shaded points.
 void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
   std::vector<std::filesystem::path> results;
   for (std::size_t i = 0; i < plan.shading->ranges; ++i)
-    results.push_back(plan.output(TaskKind::shade, i));
+    results.push_back(plan.output({TaskKind::shade}, i));
   collect_shading(shading_of(plan, run), results, plan.id, plan.shading->target, progress);
-  std::error_code gone;
-  for (const std::filesystem::path& result : results) std::filesystem::remove(result, gone);
 }
 
 /// Does a task. @return  whether it has written its output
 bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
              Progress& progress) {
   std::filesystem::create_directories(plan.folder());
-  switch (task.kind) {
+  switch (task.step.kind) {
     case TaskKind::route:
-      Route(plan, task, run, progress).run();
+      route_input(plan, task, run, progress);
       break;
     case TaskKind::part:
-      return Part(plan, task, run, progress).run();
+      return build_part(plan, task, run, progress);
+    case TaskKind::light:
+      return light(plan, task, run, progress);
+    case TaskKind::bounce:
+      return bounce(plan, task, run, progress);
     case TaskKind::join:
+      join(plan, task, run, progress);
+      remove_leftovers(plan, TaskKind::part);
+      break;
+    case TaskKind::join_light:
+      join(plan, task, run, progress);
+      remove_leftovers(plan, TaskKind::light);
+      break;
+    case TaskKind::join_bounce:
       join(plan, task, run, progress);
       break;
     case TaskKind::shade:
-      shade_range(shading_of(plan, run), {task.number, plan.shading->ranges}, plan.id,
-                  task.outputs.at(0), progress);
+      shade(plan, task, run, progress);
       break;
     case TaskKind::collect:
       collect(plan, run, progress);
+      remove_leftovers(plan, TaskKind::collect);
       break;
   }
   return true;
@@ -366,16 +154,11 @@ bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
 /// Refuses a task before its time.
 void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
   for (const FarmTask& before : plan.tasks) {
-    if (before.kind == task.after && !is_done(plan, before)) fail_unseen(plan, task, before.name());
+    if (before.step == task.after && !is_done(plan, before)) fail_unseen(plan, task, before.name());
   }
 }
 
 }  // namespace
-
-void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
-  static_cast<void>(ranges_bytes(plan, memory_bytes, kCapOfPlan));
-  static_cast<void>(sorts_bytes(plan, memory_bytes, 1, kCapOfPlan));
-}
 
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {

@@ -10,10 +10,6 @@
 
 namespace ptc {
 
-/// Checks that each task of a plan can run under a cap, with one thread.
-/// @throws LimitError that names the least cap that works
-void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes);
-
 /// Runs a task, unless it is done, and marks it as done or failed.
 ///
 /// Processes that run one task at the same time, on one machine or on several, do no harm: each

@@ -47,4 +47,17 @@ void charge_bounces(MemoryBudget& budget, const ContainerReader& scene, unsigned
                                                             LightingReport& report,
                                                             Progress& progress);
 
+/// Makes a part of that container, with its edges beside it, for one bounce of the light: joined,
+/// the parts of all that one machine makes of the whole scene (join_parts()).
+/// @param scene   a scene of parts
+/// @param lit     lights the points: the scene itself, or the joined parts of the bounce before
+/// @param options  BounceOptions::bounces and temp_dir are not used
+/// @param part    index among the parts of the scene
+/// @throws as bounce_light()
+/// Memory: as bounce_light(); a part is written, not the scene.
+void bounce_part(const ContainerReader& scene, const ContainerReader& lit,
+                 const BounceOptions& options, std::size_t part,
+                 const std::filesystem::path& target, const Executor& executor,
+                 LightingReport& report, Progress& progress);
+
 }  // namespace ptc

@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,8 @@
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/light/built_scene.h"
 #include "engine/pipeline/light/disc_light.h"
+#include "engine/pipeline/light/relit_points.h"
+#include "engine/pipeline/parts/part_edges.h"
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/shading_channels.h"
 #include "engine/scene/light/sky_map.h"
@@ -30,7 +33,6 @@
 #include "engine/shade/shader.h"
 #include "engine/store/attribute_rows.h"
 #include "engine/store/commit.h"
-#include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 #include "engine/trace/disc_visibility.h"
 #include "format/scalar.h"
@@ -38,41 +40,44 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBatch = 16 * Shader::kBlock;  // points in memory at once
-static_assert(kBatch % DiscLight::kBlock == 0);
-
 /// How far receivers rise above the points of a container, in their order.
 class Rises {
  public:
   explicit Rises(const ContainerReader& container)
-      : rows_(container, rise_groups(container.meta().channels)),
-        rise_(rows_.channels()),
-        per_page_(points_per_page(container.header())) {}
+      : container_(container),
+        rows_(container, rise_groups(container.meta().channels)),
+        rise_(rows_.channels()) {}
 
   /// Returns the rise of a point, in radii; 0 without the channel. Points are asked for in order.
-  [[nodiscard]] float radii(std::uint64_t point, std::uint64_t points) {
+  [[nodiscard]] float radii(std::uint64_t point) {
     if (rows_.row_bytes() == 0) return 0;
-    const std::uint64_t page = point / per_page_, first = page * per_page_;
-    const auto rows = rows_.read(static_cast<std::size_t>(page),
-                                 static_cast<std::uint32_t>(std::min(per_page_, points - first)));
-    return rise_.radii(rows.data() + (point - first) * rows_.row_bytes());
+    while (point - first_ >= count()) {
+      first_ += count();
+      ++page_;
+    }
+    return rise_.radii(rows_.read(page_, count()).data() + (point - first_) * rows_.row_bytes());
   }
 
  private:
+  [[nodiscard]] std::uint32_t count() const {
+    return container_.entry(container_.point_pages()[page_]).record_count;
+  }
+
+  const ContainerReader& container_;
   AttributeRows rows_;
   RisePlace rise_;
-  std::uint64_t per_page_;
+  std::size_t page_ = 0;     // that held the last point
+  std::uint64_t first_ = 0;  // number of its first point
 };
 
-/// The points of a scene with the light of a rig in place of their own, kBatch at a time.
-class LitPoints : public PointStream {
+/// The points of a scene with the light of a rig in place of their own.
+class LitPoints : public RelitPoints {
  public:
   /// @param sky  null: the sky is black
-  LitPoints(const ContainerReader& scene, DiscLight* lights, Shader* sky,
+  LitPoints(const ContainerReader& scene, const PointRange& range, DiscLight* lights, Shader* sky,
             const LightRequest& request, LightReport& report, Progress& progress)
-      : frame_(scene.header().frame),
-        all_(scene.superblock().points),
-        points_(scene),
+      : RelitPoints(scene, range),
+        frame_(scene.header().frame),
         rises_(scene),
         lights_(lights),
         sky_(sky),
@@ -80,29 +85,21 @@ class LitPoints : public PointStream {
         emission_(request.emission),
         report_(report),
         progress_(progress),
-        records_(kBatch),
         surfels_(kBatch),
         receivers_(sky ? kBatch : 0),
         heights_(kBatch),
         direct_(kBatch),
-        shading_(sky ? kBatch : 0) {}
-
-  std::size_t next(std::span<PointRecord> out) override {
-    if (at_ == count_) light_batch();
-    const std::size_t count = std::min(out.size(), count_ - at_);
-    std::copy_n(records_.begin() + static_cast<std::ptrdiff_t>(at_), count, out.begin());
-    at_ += count;
-    return count;
+        shading_(sky ? kBatch : 0) {
+    static_assert(kBatch % DiscLight::kBlock == 0);
   }
 
  private:
-  void light_batch() {
-    // Read the next points
-    at_ = 0;
-    count_ = points_.next(records_);
-    for (std::size_t i = 0; i < count_; ++i) {
-      surfels_[i] = to_surfel(records_[i], frame_);
-      const float lift = std::max(lift_, rises_.radii(first_ + i, all_));
+  void relight(std::span<PointRecord> records, std::uint64_t first) override {
+    // Place the receivers
+    const std::size_t count = records.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      surfels_[i] = to_surfel(records[i], frame_);
+      const float lift = std::max(lift_, rises_.radii(first + i));
       heights_[i] = lift_height(surfels_[i].radius, lift, frame_);
       direct_[i] = glm::vec3(0);
       if (sky_) receivers_[i] = lifted(surfels_[i], lift, frame_);
@@ -110,20 +107,20 @@ class LitPoints : public PointStream {
     // Light them
     const double begin = ptc::cpu_seconds();
     if (lights_) {
-      lights_->irradiance(std::span(surfels_).first(count_), std::span(heights_).first(count_),
-                          first_, std::span(direct_).first(count_));
+      lights_->irradiance(std::span(surfels_).first(count), std::span(heights_).first(count), first,
+                          std::span(direct_).first(count));
     }
     const double middle = ptc::cpu_seconds();
     report_.ray_cpu_seconds += middle - begin;
     Progress silent;
     if (sky_) {
-      sky_->shade(std::span(receivers_).first(count_), std::span(shading_).first(count_), silent);
+      sky_->shade(std::span(receivers_).first(count), std::span(shading_).first(count), silent);
       report_.sky_cpu_seconds += ptc::cpu_seconds() - middle;
     }
-    progress_.advance(count_);
+    progress_.advance(count);
     // Set what they reflect
-    for (std::size_t i = 0; i < count_; ++i) {
-      PointRecord& record = records_[i];
+    for (std::size_t i = 0; i < count; ++i) {
+      PointRecord& record = records[i];
       if (!emission_) record.emission = {};
       const glm::vec3 light = direct_[i] + (sky_ ? shading_[i].sky : glm::vec3(0));
       for (int c = 0; c < 3; ++c) {
@@ -133,12 +130,9 @@ class LitPoints : public PointStream {
             encode_half(reflects * std::max(0.0F, light[c]));
       }
     }
-    first_ += count_;
   }
 
   Frame frame_;
-  std::uint64_t all_;
-  ContainerPoints points_;
   Rises rises_;
   DiscLight* lights_;
   Shader* sky_;
@@ -146,14 +140,11 @@ class LitPoints : public PointStream {
   bool emission_;
   LightReport& report_;
   Progress& progress_;
-  std::vector<PointRecord> records_;
   std::vector<Surfel> surfels_;
   std::vector<Receiver> receivers_;
   std::vector<float> heights_;
   std::vector<glm::vec3> direct_;
   std::vector<Shading> shading_;
-  std::uint64_t first_ = 0;         // number of the first point of the batch
-  std::size_t count_ = 0, at_ = 0;  // points of the batch, and the next one to hand out
 };
 
 /// Returns the record of a scene that these lights lit.
@@ -189,14 +180,15 @@ void copy_channels(const ContainerReader& from, ContainerWriter& writer) {
   }
 }
 
-void check_scene(const ContainerReader& scene, const Meta& meta) {
-  at_offset(scene.file(), 0, [&] { check_copyable(scene.header()); });
-  if (!scene.parts().empty()) {
-    throw DataError(scene.path().string() +
-                    ": the surfels of a scene of parts cannot be lit: make it one file first with "
-                    "ptcconvert");
+/// @param from  the file that is copied
+void check_scene(const ContainerReader& from, const Meta& meta) {
+  at_offset(from.file(), 0, [&] { check_copyable(from.header()); });
+  if (!from.parts().empty()) {
+    throw DataError(from.path().string() +
+                    ": the surfels of a scene of parts cannot be lit as one: light its parts by "
+                    "ptcfarm, or make it one file first with ptcconvert");
   }
-  check_meta(meta, scene.header().page_shift, scene.header().point_bytes);
+  check_meta(meta, from.header().page_shift, from.header().point_bytes);
 }
 
 Uuid lit_uuid(const ContainerReader& scene, const LightRequest& request, const std::string& rig) {
@@ -209,17 +201,18 @@ Uuid lit_uuid(const ContainerReader& scene, const LightRequest& request, const s
   return uuid_of(std::as_bytes(std::span(text)));
 }
 
-/// Lights the points of a container.
-LightReport light_points(const LightRequest& request, const std::filesystem::path& target,
-                         Progress& progress) {
+/// Lights the points of a container, or those of one part of it.
+LightReport light_points(const LightRequest& request, std::optional<std::size_t> part,
+                         const std::filesystem::path& target, Progress& progress) {
   // Open the scene, and choose the lights
   LightReport report;
   const ContainerReader scene(with_directory_under(request.scene, request.run));
   const LightRig rig = normalised(
       request.lights ? *request.lights : recorded_lights(scene, request.run, target, progress));
-  const Meta planned = lit_meta(scene, rig, true);
-  check_scene(scene, planned);
-  if (planned.channels.size() < scene.meta().channels.size())
+  const ContainerReader& from = part ? *scene.parts()[*part] : scene;
+  const Meta planned = lit_meta(from, rig, true);
+  check_scene(from, planned);
+  if (planned.channels.size() < from.meta().channels.size())
     progress.note(
         "the channels of an earlier shading are left out, because they are of other light");
 
@@ -248,7 +241,7 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
     if (rig.sky.map) budget.charge("the sky as it is gathered", smooth_sky_bytes());
     budget.charge(
         "the output's directory",
-        ContainerWriter::memory_bytes(scene.page_count(), scene.header().page_shift, threads) +
+        ContainerWriter::memory_bytes(from.page_count(), scene.header().page_shift, threads) +
             held_pages_bytes(scene.header().page_shift));
     if (by_rays) {
       budget.charge("shadow rays", threads * DiscLight::thread_bytes(rig, request.light_sampling));
@@ -291,28 +284,32 @@ LightReport light_points(const LightRequest& request, const std::filesystem::pat
     shader = std::make_unique<Shader>(scene, shade, executor);
   }
   BuildRequest like;
-  adopt_profile(like, scene);
+  adopt_profile(like, from);
+  const PointRange range = points_of(scene, part);
   {
-    const Superblock& from = scene.superblock();
-    const Stage stage(report.seconds, progress, "light", from.points, "points");
-    LitPoints points(scene, lights.get(), shader.get(), request, report, progress);
+    const Stage stage(report.seconds, progress, "light", range.count(), "points");
+    LitPoints points(scene, range, lights.get(), shader.get(), request, report, progress);
     const std::unique_ptr<PointStream> rounded =
         is_rounded(like.profile) ? round_points(points, scene.header().frame.unit(), executor)
                                  : nullptr;
     PointStream& last = rounded ? *rounded : static_cast<PointStream&>(points);
+    const InputFile* replaces = part ? nullptr : &scene.file();
     ContainerWriter writer(target, {.page_shift = scene.header().page_shift,
                                     .codec = codec_of(like.profile),
-                                    .uuid = lit_uuid(scene, request, planned.text.at(kLightsKey)),
+                                    .uuid = lit_uuid(from, request, planned.text.at(kLightsKey)),
                                     .frame = scene.header().frame,
                                     .point_bytes = scene.header().point_bytes,
-                                    .source = request.replaces ? request.replaces : &scene.file()});
+                                    .source = request.replaces ? request.replaces : replaces});
     Progress silent;
-    const BuildOptions tree{.leaf_points = std::max(1U, from.leaf_points)};
-    const Superblock made = build_pages(last, writer, tree, executor, silent);
-    copy_channels(scene, writer);
-    writer.finish(lit_meta(scene, rig, report.emitters > 0), made);
+    TreeEdges edges;
+    const BuildOptions tree{.leaf_points = std::max(1U, scene.superblock().leaf_points)};
+    const Superblock made =
+        build_pages(last, writer, tree, executor, silent, {}, part ? &edges : nullptr);
+    copy_channels(from, writer);
+    writer.finish(lit_meta(from, rig, report.emitters > 0), made);
+    if (part) write_edges(target, edges);
   }
-  report.points = scene.superblock().points;
+  report.points = range.count();
   if (lights) report.rays = lights->rays();
   if (shader) report.gather = shader->counts();
   lights.reset();
@@ -327,7 +324,7 @@ LightReport light_container(const LightRequest& request, const std::filesystem::
                             Progress& progress) {
   check_ranges(request);
   if (request.lights) check_lights(*request.lights);
-  if (is_container_alone(request)) return light_points(request, target, progress);
+  if (is_container_alone(request)) return light_points(request, {}, target, progress);
   // Build a temporary container of clouds and meshes, without light, unless the inputs say which
   std::optional<LightRig> unlit;
   if (request.lights) unlit.emplace();
@@ -335,9 +332,16 @@ LightReport light_container(const LightRequest& request, const std::filesystem::
   LightRequest lighting = request;
   lighting.scene = scene.path();
   lighting.joined.clear();
-  LightReport report = light_points(lighting, target, progress);
+  LightReport report = light_points(lighting, {}, target, progress);
   scene.add_stages(report.seconds);
   return report;
+}
+
+LightReport light_part(const LightRequest& request, std::size_t part,
+                       const std::filesystem::path& target, Progress& progress) {
+  check_ranges(request);
+  if (request.lights) check_lights(*request.lights);
+  return light_points(request, part, target, progress);
 }
 
 }  // namespace ptc

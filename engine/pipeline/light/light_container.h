@@ -59,4 +59,12 @@ struct LightReport {
 LightReport light_container(const LightRequest& request, const std::filesystem::path& target,
                             Progress& progress);
 
+/// Lights the points of one part of a scene of parts by the whole scene, and writes them to a part
+/// in its place, with its edges beside it. Joined, the parts have the points, the channels and the
+/// tree that light_container() gives one file of the whole scene.
+/// @param part  index among the parts of the scene
+/// @throws as light_container()
+LightReport light_part(const LightRequest& request, std::size_t part,
+                       const std::filesystem::path& target, Progress& progress);
+
 }  // namespace ptc

@@ -144,7 +144,13 @@ Lighting::~Lighting() = default;
 
 void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
                        const glm::dvec3& eye, const std::filesystem::path& target) {
-  charge_bounces(budget, scene_, request_.bounces, executor_.threads());
+  if (request_.bounced.empty()) {
+    charge_bounces(budget, scene_, request_.bounces, executor_.threads());
+  } else {
+    bounced_ =
+        std::make_unique<ContainerReader>(with_directory_under(request_.bounced, request_.run));
+    charge_directory(budget, *bounced_);
+  }
   charge_sky(budget, sky);
   if (sky.map) budget.charge("the sky as it is gathered", smooth_sky_bytes());
   if (request_.glossy.roughness) {
@@ -175,6 +181,7 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
   const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
   options_.gather.bleeding = request_.bounces > 0 && is_lit;
   options_.gather.emission = emission;
+  if (bounced_) return;
   bounced_ = bounce_light(
       scene_, {request_.bounces, options_, request_.lift, roomiest_temp_dir(request_.run, target)},
       executor_, report_, progress_);
@@ -287,6 +294,11 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
   }
   sample_->add(receivers, lit);
   return lit;
+}
+
+void Lighting::write_bounce(std::size_t part, const std::filesystem::path& target) {
+  bounce_part(scene_, lit(), {request_.bounces, options_, request_.lift, {}}, part, target,
+              executor_, report_, progress_);
 }
 
 void Lighting::finish() {

@@ -64,6 +64,9 @@ struct LightingRequest {
   /// shades all points of the scene. 0: occlusion and sky alone, whatever GatherOptions::bleeding
   /// says.
   unsigned bounces = 1;
+  /// Container with the light of all bounces but the last, as bounce_part() and join_parts() make
+  /// it of `scene`. Empty: the run makes it.
+  std::filesystem::path bounced;
   /// Settings of the gather, between speed and error. With `error` only its sides count.
   GatherOptions gather;
   /// Error to meet, above 0 and at most 1, as CheckError::relative(); it chooses the settings of
@@ -185,6 +188,11 @@ class Lighting {
   /// @throws FormatError when a page is damaged and damage is not tolerated; std::system_error
   /// @pre tune()
   LitReceivers shade(std::span<const Receiver> receivers, std::span<const std::size_t> counts = {});
+
+  /// Writes a part of the scene with the light of the last bounce (bounce_part()).
+  /// @param part  index among the parts of scene()
+  /// @pre prepare()
+  void write_bounce(std::size_t part, const std::filesystem::path& target);
 
   /// Completes the report and frees the page cache. Nothing can be shaded afterwards.
   void finish();

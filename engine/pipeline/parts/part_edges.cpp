@@ -91,10 +91,9 @@ std::filesystem::path edges_path(const std::filesystem::path& part) {
   return path;
 }
 
-void write_edges(const std::filesystem::path& part, std::uint64_t superblock_xxh3,
-                 const TreeEdges& edges) {
+void write_edges(const std::filesystem::path& part, const TreeEdges& edges) {
   StateWriter state;
-  state.put(superblock_xxh3);
+  state.put(ContainerReader(part).superblock().xxh3);
   edges.save(state);
   write_shared_state(edges_path(part), state.take());
 }

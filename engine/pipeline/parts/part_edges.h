@@ -15,11 +15,9 @@ namespace ptc {
 /// Returns the name of the file that holds the edges of a part.
 [[nodiscard]] std::filesystem::path edges_path(const std::filesystem::path& part);
 
-/// Writes the edges of a part, whole or not at all.
-/// @param superblock_xxh3  of the part, which ties the file to it
-/// @throws std::system_error
-void write_edges(const std::filesystem::path& part, std::uint64_t superblock_xxh3,
-                 const TreeEdges& edges);
+/// Writes the edges of a part, whole or not at all, tied to it by the checksum of its superblock.
+/// @throws FormatError when the part is damaged; std::system_error
+void write_edges(const std::filesystem::path& part, const TreeEdges& edges);
 
 /// Reads the edges of a part from the file beside it, or finds them from its points where there is
 /// no such file, or one of another part.

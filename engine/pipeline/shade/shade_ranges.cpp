@@ -10,9 +10,11 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "engine/base/error.h"
 #include "engine/io/file/file.h"
+#include "engine/octree/build_pages.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/convert/convert.h"
@@ -21,6 +23,7 @@
 #include "engine/pipeline/scene_record.h"
 #include "engine/pipeline/shade/receivers.h"
 #include "engine/pipeline/shade/shaded_sink.h"
+#include "engine/store/writer.h"
 #include "format/checksum.h"
 
 namespace ptc {
@@ -99,7 +102,6 @@ void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::p
                   "a farm writes shaded points to a file of points, such as .ply");
   require_request(request.receivers.empty() && request.joined.empty() && !request.original_order,
                   "receivers", "a farm shades the points of its scene, in their order");
-  require_request(request.bounces <= 1, "bounces", "a farm shades one bounce at most");
   require_request(!request.error && !request.estimate && request.check.receivers == 0, "error",
                   "a farm shades with settings that are given, without errors and checks");
   require_request(!request.glossy.roughness && request.shadows.empty() && !request.light_groups &&
@@ -146,6 +148,21 @@ void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t p
     }
   }
   file.publish();
+}
+
+void shade_part(const ShadeRequest& request, std::size_t part, const std::filesystem::path& target,
+                Progress& progress) {
+  LightingReport report;
+  Lighting lighting(request, report, progress);
+  const ContainerReader& scene = lighting.scene();
+  MemoryBudget budget = budget_of(request.run.memory_bytes, "a bounce of light");
+  budget.charge(
+      "the output's directory",
+      ContainerWriter::memory_bytes(scene.parts()[part]->page_count(), scene.header().page_shift,
+                                    lighting.executor().threads()) +
+          held_pages_bytes(scene.header().page_shift));
+  lighting.prepare(std::move(budget), {}, false, 1, glm::dvec3(0), target);
+  lighting.write_bounce(part, target);
 }
 
 void collect_shading(const ShadeRequest& request, const std::vector<std::filesystem::path>& results,

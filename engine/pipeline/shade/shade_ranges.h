@@ -24,8 +24,8 @@ struct RangeNumber {
 };
 
 /// Refuses what cannot be shaded range by range: other receivers than the points of one container,
-/// more than one bounce, errors to meet and to estimate, reflections, shadows, groups of lights, a
-/// sky, damage, checks, and the order of the input.
+/// errors to meet and to estimate, reflections, shadows, groups of lights, a sky, damage, checks,
+/// and the order of the input.
 /// @param target  a file of points
 /// @throws RequestError
 void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::path& target);
@@ -38,6 +38,16 @@ void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::p
 /// Memory: at most RunOptions::memory_bytes.
 void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t plan,
                  const std::filesystem::path& target, Progress& progress);
+
+/// Writes a part of the scene with the light of LightingRequest::bounces bounces, its edges beside
+/// it. Joined, such parts are the LightingRequest::bounced of a run with one bounce more.
+/// @param request  its scene is a scene of parts; its own LightingRequest::bounced is needed from
+///                 two bounces on
+/// @param part     index among the parts of the scene
+/// @throws as shade_container()
+/// Memory: at most RunOptions::memory_bytes.
+void shade_part(const ShadeRequest& request, std::size_t part, const std::filesystem::path& target,
+                Progress& progress);
 
 /// Writes the file of points that shade_container() writes, from the results of all ranges.
 /// @param results  of the ranges in their order

@@ -163,7 +163,7 @@ class FarmMeasurement {
       run_timed(plan, TaskKind::shade, 1);
       std::uint64_t bytes = 0;
       for (std::size_t i = 0; i < 2; ++i)
-        bytes += std::filesystem::file_size(plan.output(TaskKind::shade, i));
+        bytes += std::filesystem::file_size(plan.output({TaskKind::shade}, i));
       run_timed(plan, TaskKind::collect, 1);
       shaded_ = ContainerReader(plan.scene).superblock().points;
       sizes_.shade_bytes = static_cast<double>(bytes) / static_cast<double>(shaded_);
@@ -185,7 +185,7 @@ class FarmMeasurement {
   void run_kind(const FarmPlan& plan, TaskKind kind, unsigned workers) const {
     std::vector<const FarmTask*> tasks;
     for (const FarmTask& task : plan.tasks) {
-      if (task.kind == kind) tasks.push_back(&task);
+      if (task.step.kind == kind) tasks.push_back(&task);
     }
     ThreadPool(workers).for_each(tasks.size(), [&](std::size_t i, unsigned) {
       Progress silent;
