@@ -58,8 +58,9 @@ class Runner {
     std::filesystem::create_directories(plan_.folder() / "log");
     note_begin(plan_);
     progress_.begin("run", plan_.tasks.size(), "tasks");
+    TaskMarks marks(plan_);
     for (const FarmTask& task : plan_.tasks) {
-      if (state_of(plan_, task) != TaskState::done) {
+      if (!marks.is_done(task)) {
         waiting_.push_back(&task);
         continue;
       }
@@ -76,11 +77,12 @@ class Runner {
   /// Starts all tasks that may run and fit. @return whether one was started
   bool start_ready() {
     if (!result_.failed.empty()) return false;
+    const TaskStep step = next_step();
     bool started = false;
     for (auto at = waiting_.begin(); at != waiting_.end();) {
       const FarmTask& task = **at;
-      const bool ready = !task.after || done_[*task.after] == counts_[*task.after];
-      if (!ready || running_.size() >= cores_ || used_bytes_ + task.memory_bytes > memory_bytes_) {
+      if (task.step != step || running_.size() >= cores_ ||
+          used_bytes_ + task.memory_bytes > memory_bytes_) {
         ++at;
         continue;
       }
@@ -89,6 +91,15 @@ class Runner {
       started = true;
     }
     return started;
+  }
+
+  /// Returns the first step that is not done: each needs all before it, also when one that was done
+  /// has lost a file.
+  [[nodiscard]] TaskStep next_step() {
+    for (const FarmTask& task : plan_.tasks) {
+      if (done_[task.step] < counts_[task.step]) return task.step;
+    }
+    return plan_.tasks.back().step;
   }
 
   /// Returns how many of the tasks that may run now run beside each other.

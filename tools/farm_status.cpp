@@ -12,6 +12,8 @@
 
 #include "engine/io/file/text_file.h"
 #include "engine/pipeline/farm/tasks.h"
+#include "engine/pipeline/farm/tuning_file.h"
+#include "tools/report.h"
 #include "tools/slurm_arrays.h"
 #include "tools/slurm_jobs.h"
 
@@ -30,9 +32,9 @@ double now() {
 }
 
 double done_seconds(const FarmPlan& plan) {
+  TaskMarks marks(plan);
   double seconds = 0;
-  for (const FarmTask& task : plan.tasks)
-    seconds += state_of(plan, task) == TaskState::done ? task.seconds : 0;
+  for (const FarmTask& task : plan.tasks) seconds += marks.is_done(task) ? task.seconds : 0;
   return seconds;
 }
 
@@ -93,11 +95,12 @@ void show_undone(const FarmPlan& plan, const SlurmQueue* queue, bool failed, Sho
 }
 
 std::vector<Shown> shown_tasks(const FarmPlan& plan, const SlurmQueue* queue) {
+  TaskMarks marks(plan);
   std::vector<Shown> tasks;
   for (const FarmTask& task : plan.tasks) {
     Shown& shown =
         tasks.emplace_back(Shown{.task = &task, .state = "done", .error = {}, .slurm = {}});
-    const TaskState state = state_of(plan, task);
+    const TaskState state = marks.state(task);
     if (state != TaskState::done) show_undone(plan, queue, state == TaskState::failed, shown);
   }
   return tasks;
@@ -171,7 +174,20 @@ Outcome farm_status(const FarmPlan& plan) {
         fmt::format(": {:.0f} s at {:.2g} times the speed of one core", left / *rate, *rate);
   outcome.summary += "\n" + failures;
   if (queue && !queue->trouble.empty()) outcome.summary += queue->trouble + "\n";
+  tell_tuning(plan, outcome);
   return outcome;
+}
+
+void tell_tuning(const FarmPlan& plan, Outcome& outcome) {
+  const auto tune = std::ranges::find(plan.tasks, TaskStep{TaskKind::tune}, &FarmTask::step);
+  if (tune == plan.tasks.end() || !TaskMarks(plan).is_done(*tune)) return;
+  try {
+    const TuningReport tuning = read_tuning(plan);
+    outcome.facts["tuning"] = facts_of(tuning);
+    outcome.summary += tuning_text(tuning);
+  } catch (const std::exception& error) {  // it is damaged or gone: the rest is worth telling
+    outcome.summary += fmt::format("{}\n", error.what());
+  }
 }
 
 }  // namespace ptc

@@ -13,4 +13,8 @@ void note_begin(const FarmPlan& plan);
 /// tasks that were submitted to it.
 [[nodiscard]] Outcome farm_status(const FarmPlan& plan);
 
+/// Adds the settings that a plan has chosen, and the error that they have, to the outcome of a run
+/// or a status; nothing where no error is asked for, or they are not chosen yet.
+void tell_tuning(const FarmPlan& plan, Outcome& outcome);
+
 }  // namespace ptc

@@ -40,8 +40,9 @@ constexpr char kPurpose[] =
     "part "
     "sorts and builds the points of one part, join writes the scene file over all parts; light "
     "lights the points of a part by the whole scene, and join_light joins the parts again; bounce "
-    "and join_bounce do so for each bounce of the light but the last; shade computes the light at "
-    "a range of the points, and collect writes the shaded points. A task that is done does nothing "
+    "and join_bounce do so for each bounce of the light but the last; tune chooses settings that "
+    "meet an error, shade computes the light at a range of the points, and collect writes the "
+    "shaded points. A task that is done does nothing "
     "when it is run again, and what a task writes appears whole or not at all.\n"
     "\n"
     "The scene refers to its parts, which stay files of their own. Its tree, and all that is "
@@ -101,7 +102,7 @@ void declare(ptc::Command& command, Arguments& arguments) {
                           "that are done left out. submit has a cluster run them, and cancel ends "
                           "its jobs. status says how far they are. export writes them for another "
                           "scheduler. route, part, join, light, join_light, bounce, join_bounce, "
-                          "shade and collect run one task.")
+                          "tune, shade and collect run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -150,7 +151,7 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                                   "Description, which other farms take.")
       ->group(kGroup);
   app.add_flag("--slurm", arguments.slurm,
-               "Submit to Slurm: an array of jobs for each kind of task\n"
+               "Submit to Slurm: an array of jobs for each step\n"
                "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
@@ -168,7 +169,8 @@ void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
           .add_output("--shade", shading.target, ptc::point_output_endings(),
                       "Also shade the points of the scene, into this file of points\n"
                       "It gets what ptcshade writes with the same options. The sky is the one of "
-                      "the scene.")
+                      "the scene. With #### in its name, each range gets a file of its own, whose "
+                      "number takes that place.")
           ->required(false)
           ->group("Shading");
   ptc::add_integer(app, "--ranges", shading.ranges, 0, 10'000,
@@ -184,9 +186,10 @@ void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
       ->group("Shading");
   ptc::add_surroundings(app, shading.request.gather.around);
   ptc::add_gather_options(app, shading.request.gather, shading.request.lift);
-  for (const char* name :
-       {"--ranges", "--count", "--colour-from", "--bounces", "--sphere", "--cone", "--distance",
-        "--solid-angle", "--parallax", "--inflation", "--resolution", "--sides", "--lift"})
+  ptc::add_error_option(app, shading.request.error);
+  for (const char* name : {"--ranges", "--count", "--colour-from", "--bounces", "--error",
+                           "--sphere", "--cone", "--distance", "--solid-angle", "--parallax",
+                           "--inflation", "--resolution", "--sides", "--lift"})
     app.get_option(name)->needs(shade);
 }
 
@@ -267,6 +270,7 @@ ptc::Outcome run(const Arguments& arguments, ptc::Command& command, ptc::Progres
   outcome.summary = done.failed.empty() ? fmt::format("{}: {} tasks ran, {} were done before\n",
                                                       plan.scene.string(), done.ran, done.skipped)
                                         : done.errors;
+  if (done.failed.empty()) ptc::tell_tuning(plan, outcome);
   return outcome;
 }
 
@@ -277,6 +281,9 @@ ptc::Outcome run_one(const Arguments& arguments, ptc::Command& command, ptc::Pro
     return other.step == step && other.number == arguments.number;
   });
   if (task == plan.tasks.end()) {
+    const bool lacks_wave = step.wave == 0 && (step.kind == ptc::TaskKind::bounce ||
+                                               step.kind == ptc::TaskKind::join_bounce);
+    if (lacks_wave) throw CLI::RequiredError("--wave");
     throw CLI::ValidationError(
         "--number", fmt::format("the plan has no task {}.{}", step.name(), arguments.number));
   }
@@ -300,9 +307,9 @@ ptc::Outcome submit(const Arguments& arguments) {
 ptc::Outcome cancel(const Arguments& arguments) {
   const ptc::FarmPlan plan = only_plan(arguments);
   const std::vector<std::string> jobs = ptc::cancel_in_slurm(plan);
-  const auto done = std::ranges::count_if(plan.tasks, [&](const ptc::FarmTask& task) {
-    return ptc::state_of(plan, task) == ptc::TaskState::done;
-  });
+  ptc::TaskMarks marks(plan);
+  const auto done = std::ranges::count_if(
+      plan.tasks, [&](const ptc::FarmTask& task) { return marks.is_done(task); });
   const std::size_t left = plan.tasks.size() - static_cast<std::size_t>(done);
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["cancelled"] = jobs;

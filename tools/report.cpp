@@ -76,6 +76,24 @@ ordered_json facts_of(const EstimateReport& estimate) {
   return {{"pilots", estimate.pilots}, {"cpu_seconds", estimate.cpu_seconds}};
 }
 
+std::string worth_line(const char* of, const EstimateWorth& worth) {
+  return fmt::format(
+      "  estimates of {}: rank correlation {:.2f} with the error, RMS {:.2f} times that of the "
+      "error; RMS error {:.2f} times the overall one in the top tenth of estimates, {:.2f} times "
+      "in the bottom tenth; {:.1f} % of errors within twice the estimate\n",
+      of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
+}
+
+std::string check_line(const char* against, const CheckError& error) {
+  return fmt::format(
+      "  against rays at the {}: occlusion RMS error {:.4f}, bias {:+.4f}; irradiance RMS error "
+      "{:.2f} %, bias {:+.2f} %; error {:.2f} %\n",
+      against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
+      100 * error.irradiance_bias, 100 * error.relative());
+}
+
+}  // namespace
+
 ordered_json facts_of(const TuningReport& tuning) {
   return {{"asked", tuning.asked},
           {"met", tuning.met},
@@ -129,24 +147,6 @@ std::string tuning_text(const TuningReport& tuning) {
       100 * tuning.asked, setting, with_bounds, tuning.pilots,
       100 * tuning.measured.relative_noise());
 }
-
-std::string worth_line(const char* of, const EstimateWorth& worth) {
-  return fmt::format(
-      "  estimates of {}: rank correlation {:.2f} with the error, RMS {:.2f} times that of the "
-      "error; RMS error {:.2f} times the overall one in the top tenth of estimates, {:.2f} times "
-      "in the bottom tenth; {:.1f} % of errors within twice the estimate\n",
-      of, worth.rank, worth.rms, worth.top_tenth, worth.bottom_tenth, 100 * worth.within_twice);
-}
-
-std::string check_line(const char* against, const CheckError& error) {
-  return fmt::format(
-      "  against rays at the {}: occlusion RMS error {:.4f}, bias {:+.4f}; irradiance RMS error "
-      "{:.2f} %, bias {:+.2f} %; error {:.2f} %\n",
-      against, error.occlusion_rms, error.occlusion_bias, 100 * error.irradiance_rms,
-      100 * error.irradiance_bias, 100 * error.relative());
-}
-
-}  // namespace
 
 ordered_json container_facts(const Superblock& superblock) {
   const FileHeader& header = superblock.header;

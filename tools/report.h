@@ -15,6 +15,8 @@ namespace ptc {
 [[nodiscard]] nlohmann::ordered_json container_facts(const Superblock& superblock);
 /// The room that a build needs and has, in bytes, for temporary files and for the output.
 [[nodiscard]] nlohmann::ordered_json facts_of(const BuildSpace& space);
+/// The settings that were chosen, and the error that they have.
+[[nodiscard]] nlohmann::ordered_json facts_of(const TuningReport& tuning);
 /// Points, buckets and spilled bytes of an external sort.
 [[nodiscard]] nlohmann::ordered_json facts_of(const SortStatistics& sort);
 /// Lookups, hits, evictions, bytes read, frames and waiting time of a page cache.
@@ -35,6 +37,8 @@ namespace ptc {
 /// What a simplification leaves, its errors, and all trials.
 [[nodiscard]] nlohmann::ordered_json facts_of(const SimplificationChoice& choice);
 
+/// The line about settings that were chosen.
+[[nodiscard]] std::string tuning_text(const TuningReport& tuning);
 /// The line about a number of surfels that was chosen.
 [[nodiscard]] std::string choice_text(const SurfelChoice& choice);
 /// The lines about a simplification that was chosen.

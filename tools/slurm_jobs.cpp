@@ -171,7 +171,8 @@ std::vector<std::string> submit_to_slurm(const FarmPlan& plan) {
   // Submit a step after the other
   std::vector<Job> jobs;
   std::vector<std::string> all, after;
-  const auto undone = [&](const FarmTask& task) { return state_of(plan, task) != TaskState::done; };
+  TaskMarks marks(plan);
+  const auto undone = [&](const FarmTask& task) { return !marks.is_done(task); };
   try {
     for (const TaskStep& step : steps_of(plan)) {
       std::vector<std::string> ids;

@@ -3,7 +3,7 @@
 //   city.slurm/part_0.sh ...   what was submitted, for sbatch
 //   city.slurm/jobs.json       numbers of the jobs
 //
-// Slurm says what waits and what runs; what is done stands on the disk (state_of()).
+// Slurm says what waits and what runs; what is done stands on the disk (TaskMarks).
 #pragma once
 
 #include <filesystem>
@@ -32,7 +32,7 @@ struct SlurmQueue {
 /// Returns the folder of the scripts, "city.slurm" beside "city.json".
 [[nodiscard]] std::filesystem::path slurm_folder(const FarmPlan& plan);
 
-/// Submits the tasks that are not done: an array for each kind, after the one before.
+/// Submits the tasks that are not done: an array for each step, after the one before.
 /// @return  the numbers of the jobs; none when all tasks are done
 /// @throws DataError when jobs of the plan are in the queue; std::system_error with what sbatch
 ///         said when it fails, with the jobs before it cancelled

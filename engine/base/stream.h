@@ -31,6 +31,12 @@ class PointSource {
   /// @return the number of surfels in `out`; 0 at the end
   /// @throws DataError that names the file and the offset (binary) or line (text) of the bad point
   virtual std::size_t next(std::span<Surfel> out) = 0;
+  /// Passes over the first surfels without reading all of them.
+  /// @param surfels  at most as many as there are
+  /// @return false when this source has to read all that it yields: then none is passed over
+  /// @pre next() was not called
+  /// @throws as next()
+  [[nodiscard]] virtual bool skip(std::uint64_t /*surfels*/) { return false; }
   /// Returns the attributes of the surfels that next() returned last: one row for each of them, the
   /// values of all channels of the source in their order, little-endian, without padding. Empty
   /// when the source has no channels. Valid until the next call of next().

@@ -21,6 +21,7 @@ class OwnedPoints : public PointSource {
       : container_(std::move(container)), points_(open_selected(*container_, selection)) {}
 
   std::size_t next(std::span<Surfel> out) override { return points_->next(out); }
+  [[nodiscard]] bool skip(std::uint64_t surfels) override { return points_->skip(surfels); }
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override {
     return points_->attributes();
   }

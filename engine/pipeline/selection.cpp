@@ -56,6 +56,9 @@ class SelectedPoints : public PointSource {
     return 0;
   }
 
+  [[nodiscard]] bool skip(std::uint64_t surfels) override {
+    return selection_.takes_all() && source_->skip(surfels);
+  }
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return rows_; }
   [[nodiscard]] std::uint64_t left_out() const noexcept override { return source_->left_out(); }
   [[nodiscard]] std::optional<Extent> extent() override {

@@ -1,7 +1,5 @@
 #include "engine/store/container_points.h"
 
-#include <algorithm>
-
 #include "format/error.h"
 
 namespace ptc {
@@ -18,19 +16,8 @@ std::size_t ContainerPoints::next(std::span<PointRecord> out) {
 }
 
 void ContainerPoints::skip(std::uint64_t points) {
-  while (points > 0) {
-    if (at_ < scan_.count()) {  // on the open page
-      const auto some =
-          static_cast<std::uint32_t>(std::min<std::uint64_t>(points, scan_.count() - at_));
-      at_ += some;
-      points -= some;
-    } else if (scan_.next_count() > 0 && points >= scan_.next_count()) {
-      points -= scan_.next_count();
-      scan_.skip(1);
-    } else if (!open_page()) {
-      return;
-    }
-  }
+  const std::uint64_t left = scan_.skip_points(points);
+  if (left > 0 && open_page()) at_ = static_cast<std::uint32_t>(left);
 }
 
 bool ContainerPoints::open_page() {

@@ -21,7 +21,9 @@ class ContainerPoints : public PointStream {
   /// @throws FormatError when a page is damaged or its keys precede those of the page before;
   ///         std::system_error
   std::size_t next(std::span<PointRecord> out) override;
-  /// Passes over points; only the page on which it ends is read.
+  /// Passes over the first points; of their pages only the one on which they end is read.
+  /// @param points  at most as many as there are
+  /// @pre nothing is read yet
   /// @throws as next()
   void skip(std::uint64_t points);
 

@@ -30,6 +30,11 @@ void PointScan::skip(std::size_t pages) noexcept {
   next_ += std::min(pages, pages_.size() - next_);
 }
 
+std::uint64_t PointScan::skip_points(std::uint64_t points) noexcept {
+  for (; next_count() > 0 && points >= next_count(); skip(1)) points -= next_count();
+  return points;
+}
+
 std::uint32_t PointScan::next_count() const noexcept {
   return next_ == pages_.size() ? 0 : container_.entry(pages_[next_]).record_count;
 }

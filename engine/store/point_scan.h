@@ -38,6 +38,10 @@ class PointScan {
   bool next();
   /// Passes over pages without reading them, at most to the end.
   void skip(std::size_t pages) noexcept;
+  /// Passes over the pages that lie within the next points, without reading them.
+  /// @return  how many of the points lie on the page that next() would read, fewer than it has, or
+  ///          behind the last page
+  [[nodiscard]] std::uint64_t skip_points(std::uint64_t points) noexcept;
 
   /// Number of points on the page that next() would read; 0 at the end.
   [[nodiscard]] std::uint32_t next_count() const noexcept;

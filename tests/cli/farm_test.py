@@ -325,6 +325,7 @@ class Farm(ProgramTest):
                              (lambda p: p["request"].update(levels_per_stream=99), "levels in a stream"),
                              (lambda p: p["request"].update(every=0), "every 0 points"),
                              (lambda p: p["frame"].update(edge=0), "no edge"),
+                             (lambda p: p["inputs"][0].update(first=5), "does not follow the one before"),
                              (lambda p: p["tasks"][0].update(seconds=-1), "seconds"),
                              (lambda p: p.update(scene="farm.ptcx"), "no absolute path")):
             plan = json.loads(whole)
@@ -390,7 +391,7 @@ class Farm(ProgramTest):
                 self.assertIn("plan again", message.stderr)
                 self.assertFalse((self.here / "farm.parts" / "route.0").exists())
                 if source != parts:  # a plan of the new file is another plan
-                    self.assertNotEqual(self.plan(source)["inputs"], before["inputs"])
+                    self.assertNotEqual(self.plan(source)["files"], before["files"])
 
     def test_other_or_damaged_plans_are_refused(self):
         path = self.here / "farm.json"
@@ -491,7 +492,8 @@ class Farm(ProgramTest):
         self.succeed("ptcshade", self.here / "farm.ptcx", "-o", one, *shade[2:], "--threads", "1")
         self.assertTrue(lit.read_bytes() == one.read_bytes(), shade)
         folder = self.here / "farm.parts"
-        self.assertEqual([path.name for path in folder.iterdir() if path.is_file() and ".ptcx" not in path.name], [])
+        left = {path.name for path in folder.iterdir() if path.is_file()}
+        self.assertLessEqual(left, {"tune", *(f"{i}.ptcx{end}" for i in range(4) for end in ("", ".edges"))})
         self.assertEqual(self.run_plan()["ran"], 0)
         return facts
 
@@ -514,6 +516,29 @@ class Farm(ProgramTest):
         self.check_shaded(["--city", "150k"], ["--ranges", 2, "--bounces", 3, *self.COARSE])
         done = {path.name for path in (self.here / "farm.parts" / "done").iterdir()}
         self.assertLess({"bounce_1.3", "join_bounce_1", "bounce_2.0", "join_bounce_2", "shade.1"}, done)
+
+    def test_the_settings_that_meet_an_error_are_chosen_by_a_task(self):
+        self.check_shaded(["--city", "150k"], ["--ranges", 3, "--count", "140k", "--bounces", 2, "--error", "20%"])
+        for action in ("run", "status"):
+            tuning = json.loads(self.succeed("ptcfarm", action, self.here / "farm.json", "--json").stdout)["tuning"]
+            self.assertTrue(tuning["met"])
+            self.assertEqual(tuning["asked"], 0.2)
+            self.assertLess(0, tuning["measured"]["occlusion_rms"])
+            self.assertIn("20 % asked, ", self.succeed("ptcfarm", action, self.here / "farm.json").stdout)
+        # A finished plan needs the settings no more
+        settings = self.here / "farm.parts" / "tune"
+        whole = bytearray(settings.read_bytes())
+        settings.unlink()
+        self.assertEqual(self.run_plan()["ran"], 0)
+        whole[40] ^= 1
+        settings.write_bytes(whole)
+        self.assertIn("the state's checksum is wrong", self.succeed("ptcfarm", "status", self.here / "farm.json").stdout)
+        (self.here / "lit.ply").unlink()
+        failed = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(failed.returncode, 1)
+        self.assertIn(f"{settings}: the state's checksum is wrong", failed.stderr)
+        self.assertIn("combined with --error", self.fail_with(2, "ptcfarm", "plan", self.cloud, "--shade", self.here / "lit.ply", "--error", "5%",
+                                                         "--solid-angle", 0.1, "-o", self.here / "o.json"))
 
     def check_lit(self, cloud, lights, *options):
         """Compares the scene of a plan with lights with what ptclight makes of one machine's container."""
@@ -550,6 +575,36 @@ class Farm(ProgramTest):
         part.unlink()
         self.run_plan()
         self.assertEqual((scene.read_bytes(), part.read_bytes()), before)
+        names = {path.name for path in part.parent.iterdir() if path.is_file()}
+        self.assertEqual(names, {f"{i}.ptcx{end}" for i in range(4) for end in ("", ".edges")})
+
+    def test_plans_that_take_turns_under_one_name_do_not_take_each_others_files_for_theirs(self):
+        lit = [self.cloud, "--sun", "120,50", "--sky", "0.2"]
+        digests = []
+        for plan in (lit, [self.cloud], lit, [self.cloud]):
+            self.plan(*plan)
+            self.run_plan()
+            digests.append(self.digest(self.here / "farm.ptcx"))
+        self.assertEqual(digests[:2], digests[2:])
+        self.assertNotEqual(digests[0], digests[1])
+        # A task that was killed when its file was there and its mark was not leaves no mark of the other plan
+        mark = self.here / "farm.parts" / "done" / "part.1"
+        before = mark.read_bytes()
+        self.plan(*lit)
+        part = self.here / "farm.parts" / "1.ptcx"
+        part.unlink()
+        part.mkdir()  # so that the task fails
+        self.assertEqual(run("ptcfarm", "run", self.here / "farm.json").returncode, 3)
+        self.assertNotEqual(before, b"")
+        self.assertFalse(mark.exists())
+
+    def test_a_part_that_is_lost_before_what_comes_behind_it_is_built_first(self):
+        plan = self.plan(self.cloud, "--shade", self.here / "lit.ply", "--ranges", 1, *self.COARSE)
+        for task in plan["tasks"][:6]:
+            self.succeed(*task["command"])
+        (self.here / "farm.parts" / "2.ptcx").unlink()
+        facts = self.run_plan()
+        self.assertEqual((facts["ran"], facts["retried"]), (4, 0))
 
     def test_light_waits_for_the_scene_and_takes_no_other_picture_of_the_sky(self):
         sky = self.here / "sky.hdr"
@@ -564,6 +619,39 @@ class Farm(ProgramTest):
         self.assertFalse((self.here / "farm.ptcx").exists())
         self.assertEqual(plan["lighting"]["rig"]["sky"]["map"], str(sky))
         self.assertIn("--sun-rays requires a light", self.fail_with(2, "ptcfarm", "plan", self.cloud, "--sun-rays", 2, "-o", self.here / "o.json"))
+
+    def test_ranges_get_files_of_their_own_that_together_are_the_file_of_one_machine(self):
+        one, cloud = self.here / "one.ply", self.here / "a.ply"
+        points = [(*point, i % 251) for i, point in enumerate(ball(70000))]
+        write_ply(cloud, points, CHANNELS)
+        for folder in ("lit", "las"):
+            (self.here / folder).mkdir()
+        self.plan(cloud, "--shade", self.here / "lit" / "x.###.ply", "--ranges", 4, "--bounces", 2, *self.COARSE)
+        self.run_plan()
+        self.succeed("ptcshade", self.here / "farm.ptcx", "-o", one, "--bounces", 2, *self.COARSE)
+        names = ["x.001.ply", "x.003.ply"]  # two batches: the other ranges have no points
+        self.assertEqual(sorted(path.name for path in (self.here / "lit").iterdir()), names)
+        body = lambda path: path.read_bytes().split(b"end_header\n", 1)[1]
+        self.assertTrue(b"".join(body(self.here / "lit" / name) for name in names) == body(one))
+        folder = self.here / "farm.parts"
+        self.assertEqual([path.name for path in folder.iterdir() if path.name.startswith(("bounce", "shade"))], [])
+        # A lost file is shaded anew; without the bounces, these come back first
+        lost = self.here / "lit" / names[0]
+        before = lost.read_bytes()
+        lost.unlink()
+        self.run_plan()
+        self.assertEqual(lost.read_bytes(), before)
+        self.assertEqual(self.run_plan()["ran"], 0)
+        # As tiles they are what one file is
+        self.succeed("ptcconvert", one, self.here / "one.las")
+        self.plan(cloud, "--shade", self.here / "las" / "#.las", "--ranges", 2, "--bounces", 0, *self.COARSE)
+        self.run_plan()
+        facts = [json.loads(self.succeed("ptcbuild", path, "-o", self.here / "o.ptcx", "--json").stdout)["points"]
+                 for path in (self.here / "las", self.here / "one.las")]
+        self.assertEqual(facts, [70000, 70000])
+        message = self.fail_with(2, "ptcfarm", "plan", self.here / "lit" / names[0], "-o", self.here / "farm.json",
+                                 "--shade", self.here / "lit" / "x.###.ply")
+        self.assertIn("is an input", message)
 
     def test_damaged_or_foreign_results_of_ranges_are_refused(self):
         lit = self.here / "lit.ply"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include <catch2/catch.hpp>
 
 #include "engine/pipeline/parts/part_edges.h"
+#include "engine/pipeline/shade/shade_ranges.h"
 #include "tests/support/scenes.h"
 #include "tests/support/temporary_directory.h"
 
@@ -71,7 +73,7 @@ TEST_CASE("task: a part that loses its routes to the join of others ends well", 
   AtStage others("sort", [&] { city.run_all(); });
   CHECK_FALSE(run_task(city.plan, city.task("part.0"), {}, others));
   CHECK(others.called());
-  CHECK(state_of(city.plan, city.task("part.0")) == TaskState::done);
+  CHECK(TaskMarks(city.plan).state(city.task("part.0")) == TaskState::done);
 }
 
 TEST_CASE("task: a part that another process does first writes the same files", "[farm][tasks]") {
@@ -93,7 +95,7 @@ TEST_CASE("task: a route that is later than the parts leaves no file", "[farm][t
   AtStage others("route", [&] { city.run_all(); });
   CHECK(run_task(city.plan, city.task("route.0"), {}, others));
   CHECK_FALSE(std::filesystem::exists(city.plan.output({TaskKind::route}, 0)));
-  CHECK(state_of(city.plan, city.task("route.0")) == TaskState::done);
+  CHECK(TaskMarks(city.plan).state(city.task("route.0")) == TaskState::done);
 }
 
 TEST_CASE("task: edges of an earlier part stay until those of the next replace them",
@@ -107,4 +109,76 @@ TEST_CASE("task: edges of an earlier part stay until those of the next replace t
   AtStage others("sort", [&] { CHECK((test::bytes_of(edges_path(city.part(1))) == edges)); });
   CHECK(run_task(city.plan, city.task("part.1"), {}, others));
   CHECK(others.called());
+}
+
+namespace {
+
+/// Writes surfels on a bent sheet as text, with channels of their own.
+void write_sheet(const std::filesystem::path& path, int points, const std::string& names,
+                 const std::string& values) {
+  std::ofstream out(path);
+  out << "ply\nformat ascii 1.0\nelement vertex " << points << '\n';
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz", "radius"})
+    out << "property float " << name << '\n';
+  out << names << "end_header\n";
+  for (int i = 0; i < points; ++i) {
+    out << i % 97 << ' ' << i / 97 << ' ' << i % 7 << " 0 0 1 0.5";
+    for (const char c : values) out << ' ' << (c == 'i' ? i % 250 : 3);
+    out << '\n';
+  }
+}
+
+}  // namespace
+
+TEST_CASE("task: routes of shares of containers give the parts of whole routes", "[farm][tasks]") {
+  // One has two channels, the other one of them; the plan records the order of both
+  const test::TemporaryDirectory directory;
+  Progress silent;
+  BuildRequest request{.original_order = true};
+  for (const std::string name : {"a", "b"}) {
+    const bool both = name == "a";
+    write_sheet(directory / (name + ".ply"), both ? 9000 : 7000,
+                both ? "property uchar classification\nproperty uchar intensity\n"
+                     : "property uchar intensity\n",
+                both ? "ci" : "i");
+    request.inputs.push_back(directory / (name + ".ptcx"));
+    build_container({.inputs = {directory / (name + ".ply")}, .page_shift = 12},
+                    request.inputs.back(), silent);
+  }
+  std::vector<std::vector<char>> parts;
+  std::vector<std::size_t> routes;
+  for (const std::uint64_t share : {std::uint64_t{100'000}, std::uint64_t{2'000}}) {
+    FarmOptions options{.parts = 2, .share_points = share};
+    options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
+    const auto name = [&](const char* end) {
+      return directory / ("of" + std::to_string(share) + end);
+    };
+    FarmPlan plan = make_plan(request, name(".ptcx"), name(".json"), options, silent);
+    write_plan(plan);
+    plan = read_plan(plan.file, options.command);
+    for (const FarmTask& task : plan.tasks) run_task(plan, task, {}, silent);
+    routes.push_back(plan.inputs.size());
+    for (std::size_t i = 0; i < 2; ++i)
+      parts.push_back(test::bytes_of(plan.output({TaskKind::part}, i)));
+  }
+  CHECK(routes == std::vector<std::size_t>{2, 7});
+  CHECK((parts[0] == parts[2]));
+  CHECK((parts[1] == parts[3]));
+}
+
+TEST_CASE("ranges: rays of a range are those of a whole run", "[farm][ranges]") {
+  const test::TemporaryDirectory directory;
+  Progress silent;
+  BuildRequest city;
+  city.city_points = 140'000;
+  build_container(city, directory / "city.ptcx", silent);
+  ShadeRequest request{{.scene = directory / "city.ptcx", .receiver_rays = 2}};
+  shade_container(request, directory / "whole.ply", silent);
+  std::vector<std::filesystem::path> results;
+  for (std::size_t i = 0; i < 3; ++i) {
+    results.push_back(directory / ("range." + std::to_string(i)));
+    shade_range(request, {i, 3}, 7, results.back(), silent);
+  }
+  collect_shading(request, results, 7, directory / "ranges.ply", silent);
+  CHECK((test::bytes_of(directory / "ranges.ply") == test::bytes_of(directory / "whole.ply")));
 }

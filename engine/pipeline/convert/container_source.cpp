@@ -145,6 +145,13 @@ bool ContainerSource::next_page() {
   return true;
 }
 
+bool ContainerSource::skip(std::uint64_t surfels) {
+  if (pages_.ranks) return false;
+  const std::uint64_t left = scan_.skip_points(surfels);
+  if (left > 0 && next_page()) at_ = static_cast<std::uint32_t>(left);
+  return true;
+}
+
 std::size_t ContainerSource::next(std::span<Surfel> out) {
   if (at_ == scan_.count() && !next_page()) return 0;
   const PointPage points = scan_.points();

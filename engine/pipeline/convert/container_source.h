@@ -32,6 +32,8 @@ class ContainerSource : public PointSource {
   /// @param container  must outlive this
   explicit ContainerSource(const ContainerReader& container, SourcePages pages = {});
   std::size_t next(std::span<Surfel> out) override;
+  /// Passes over points of a source that reads all pages.
+  [[nodiscard]] bool skip(std::uint64_t surfels) override;
   [[nodiscard]] std::span<const std::byte> attributes() const noexcept override { return given_; }
   /// The channels of a row.
   [[nodiscard]] const std::vector<Channel>& channels() const noexcept { return rows_.channels(); }

@@ -2,6 +2,7 @@
 #include "engine/pipeline/farm/build_tasks.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -28,6 +29,7 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
+constexpr std::uint64_t kAll = std::numeric_limits<std::uint64_t>::max();
 
 constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
 
@@ -67,16 +69,19 @@ class Route {
     const FarmInput& input = plan_.inputs[number_];
     progress_.begin("route", input.points, "points");
     if (input.path.empty()) {
-      feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput);
+      feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput, kAll);
     } else {
-      require_unchanged(input.states);
+      const std::vector<InputState>& states = plan_.files.at(input.path);
+      require_unchanged(states);
       for (std::size_t i = 0; i < number_; ++i) points_ += plan_.inputs[i].points;
       const PointFile file = open_placed_points(input.path, plan_.request.selection, {});
       require_planned(file.info.channels == input.channels);
+      require_planned(input.first == 0 || file.source->skip(input.first));
       const std::uint64_t before = points_;
-      feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number());
+      feed(*file.source, input.channels.empty() ? AttributePlan::kNoInput : input_number(),
+           plan_.is_divided(number_) ? input.points : kAll);
       require_planned(points_ - before == input.points);
-      require_unchanged(input.states);  // nor while it was read
+      require_unchanged(states);  // nor while it was read
     }
     writer_.finish();
     progress_.end();
@@ -90,15 +95,24 @@ class Route {
                     ": the file changed since it was planned: plan again");
   }
 
-  /// Returns the input's number among those that have channels.
+  /// Returns the number of the input's file among those that have channels.
   [[nodiscard]] std::size_t input_number() const {
-    return static_cast<std::size_t>(std::count_if(
-        plan_.inputs.begin(), plan_.inputs.begin() + static_cast<std::ptrdiff_t>(number_),
-        [](const FarmInput& input) { return !input.channels.empty(); }));
+    const auto of_file = [](const FarmInput& input) {
+      return !input.channels.empty() && input.first == 0;
+    };
+    const auto begin = plan_.inputs.begin();
+    const auto files =
+        std::count_if(begin, begin + static_cast<std::ptrdiff_t>(number_ + 1), of_file);
+    return static_cast<std::size_t>(files - 1);
   }
 
-  void feed(PointSource& source, std::size_t input) {
-    while (const std::size_t count = source.next(surfels_)) {
+  /// @param most  points that are taken
+  void feed(PointSource& source, std::size_t input, std::uint64_t most) {
+    for (std::uint64_t left = most; left > 0;) {
+      const std::size_t count = source.next(std::span(surfels_).first(
+          static_cast<std::size_t>(std::min<std::uint64_t>(left, surfels_.size()))));
+      if (count == 0) break;
+      left -= count;
       const auto records = std::span(records_).first(count);
       executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) records[i] = to_record(surfels_[i], plan_.frame);

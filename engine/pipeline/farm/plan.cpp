@@ -15,6 +15,7 @@
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/build/build_inputs.h"
 #include "engine/pipeline/build/build_record.h"
+#include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/farm/build_tasks.h"
 #include "engine/pipeline/farm/cuts.h"
 #include "engine/pipeline/farm/plan_checks.h"
@@ -28,13 +29,12 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kSharePoints = 4'000'000;  // of the city, for one task
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
-constexpr std::size_t kMaxParts = 10'000;
-constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
-constexpr std::size_t kMaxRanges = 10'000;
-constexpr double kMaxSeconds = 1e9;  // of a task
+constexpr std::uint64_t kRangePoints = 1'000'000;   // that a task shades
+constexpr double kMaxSeconds = 1e9;                 // of a task
+constexpr std::uint64_t kMaxShares = 10'000;        // of a file
+constexpr std::uint32_t kMaxShadowRays = 1U << 16;  // of a point to lights of one kind
 
 /// @param lit  the points are lit anew
 void check_inputs(const BuildInputs& inputs, bool lit) {
@@ -79,6 +79,51 @@ void check_channels(const FarmPlan& plan, const FarmInput& input) {
   }
 }
 
+/// Checks that shares of a file follow each other, and that the states of all files are known.
+void check_files(const FarmPlan& plan) {
+  for (std::size_t i = 0; i < plan.inputs.size(); ++i) {
+    const FarmInput& input = plan.inputs[i];
+    require(plan, input.path.empty() || plan.files.contains(input.path),
+            "the state of an input is missing");
+    if (input.first == 0) continue;
+    const auto follows = [&](const FarmInput& before) {
+      return before.path == input.path && before.channels == input.channels &&
+             before.taken == input.taken && before.points <= input.first &&
+             before.first == input.first - before.points;
+    };
+    require(plan, i > 0 && !input.path.empty() && follows(plan.inputs[i - 1]),
+            "a share of an input does not follow the one before");
+  }
+}
+
+/// Checks how a plan lights its points.
+void check_lighting(const LightRequest& lighting) {
+  check_ranges(lighting);
+  check_lights(lighting.lights.value());
+  const auto check_rays = [](unsigned rays, const char* field) {
+    require_request(rays >= 1 && rays <= kMaxShadowRays, field,
+                    "a point has 1 to 65536 shadow rays to lights of a kind");
+  };
+  check_rays(lighting.light_sampling.sun_rays, "light_sampling.sun_rays");
+  check_rays(lighting.light_sampling.area_rays, "light_sampling.area_rays");
+  const LightRequest usual;
+  require_request(lighting.gather.sides == usual.gather.sides && lighting.emission &&
+                      lighting.gather.solid_angle == usual.gather.solid_angle &&
+                      lighting.gather.parallax == usual.gather.parallax &&
+                      lighting.gather.inflation == usual.gather.inflation &&
+                      lighting.gather.resolution == usual.gather.resolution &&
+                      lighting.gather.around.is_plain() && lighting.lift == usual.lift,
+                  "gather", "a farm lights with the usual settings of the gather");
+}
+
+/// Returns the number of tasks that a plan implies.
+std::size_t count_tasks(const FarmPlan& plan) {
+  const std::size_t tune = plan.shading && plan.shading->request.error ? 1 : 0;
+  const std::size_t shading = plan.shading ? tune + plan.shading->ranges + 1 : 0;
+  const std::size_t builds = 1 + (plan.lighting ? 1 : 0) + plan.waves();
+  return plan.inputs.size() + builds * (plan.parts() + 1) + shading;
+}
+
 /// Checks what a plan says, but for its tasks.
 void check_plan(const FarmPlan& plan) {
   require(
@@ -105,13 +150,11 @@ void check_plan(const FarmPlan& plan) {
             "an input has blocks that the city lacks");
     check_channels(plan, input);
   }
+  check_files(plan);
   require(plan,
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
-  if (plan.lighting) {
-    check_ranges(*plan.lighting);
-    check_lights(plan.lighting->lights.value());
-  }
+  if (plan.lighting) check_lighting(*plan.lighting);
   if (!plan.shading) return;
   require(plan, plan.shading->target.is_absolute() && !has_control_characters(plan.shading->target),
           "the shaded points are no absolute path without control characters");
@@ -127,9 +170,7 @@ void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
       "the tasks are not a route for each input, a part for each range, and a join, nor those that "
       "light and shade";
   const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
-  const std::size_t shading = plan.shading ? plan.shading->ranges + 1 : 0;
-  const std::size_t builds = 1 + (plan.lighting ? 1 : 0) + plan.waves();
-  require(plan, said.size() == plan.inputs.size() + builds * (plan.parts() + 1) + shading, kTasks);
+  require(plan, said.size() == count_tasks(plan), kTasks);
   add_tasks(plan, 0);
   const auto same = [](const FarmTask& a, const FarmTask& b) {
     return a.step == b.step && a.number == b.number;
@@ -146,10 +187,19 @@ void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
   }
 }
 
-/// Divides the city into shares of some million points.
-std::vector<FarmInput> city_shares(std::uint64_t points) {
+/// Returns into how many shares a cloud is divided: one, where its points can only be read from the
+/// first one on.
+std::uint64_t shares_of(const Clouds::Cloud& cloud, const Selection& selection,
+                        std::uint64_t share_points) {
+  const std::uint64_t shares = std::min<std::uint64_t>(cloud.points / share_points, kMaxShares);
+  if (shares < 2 || !selection.takes_all()) return 1;
+  return open_placed_points(cloud.path, selection, {}).source->skip(0) ? shares : 1;
+}
+
+/// Divides the city into shares of so many points.
+std::vector<FarmInput> city_shares(std::uint64_t points, std::uint64_t share_points) {
   const std::uint64_t blocks = city_blocks(points);
-  const std::uint64_t shares = std::clamp<std::uint64_t>(points / kSharePoints, 1, blocks);
+  const std::uint64_t shares = std::clamp<std::uint64_t>(points / share_points, 1, blocks);
   std::vector<FarmInput> inputs;
   for (std::uint64_t i = 0; i < shares; ++i) {
     inputs.push_back({.blocks = {.first = blocks * i / shares, .end = blocks * (i + 1) / shares},
@@ -176,7 +226,8 @@ std::vector<glm::dvec3> sample_city(std::uint64_t points) {
 AttributePlan FarmPlan::attributes() const {
   AttributePlan plan;
   for (const FarmInput& input : inputs) {
-    if (!input.channels.empty()) static_cast<void>(plan.add_input(input.channels, input.taken));
+    if (!input.channels.empty() && input.first == 0)  // the shares of a file are one input
+      static_cast<void>(plan.add_input(input.channels, input.taken));
   }
   const std::vector<Channel>& wanted = meta.channels;
   if (request.original_order) plan.add_original_index();
@@ -206,10 +257,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                 .request = request,
                 .lighting = options.lighting,
                 .shading = options.shading};
-  if (plan.lighting) {
-    check_ranges(*plan.lighting);
-    check_lights(plan.lighting->lights.value());
-  }
+  if (plan.lighting) check_lighting(*plan.lighting);
   if (plan.shading) {
     plan.shading->target = std::filesystem::absolute(plan.shading->target);
     check_shade_by_ranges(plan.shading->request, plan.shading->target);
@@ -219,10 +267,9 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
       throw DataError(input.string() + ": a plan takes files that all machines see, and no URL");
   }
   check_plan_paths(request, plan);
-  std::map<std::filesystem::path, std::vector<InputState>> states;
   for (const std::filesystem::path& input : request.inputs) {
     const std::filesystem::path path = std::filesystem::absolute(input);
-    states[path] = states_of(path);
+    plan.files[path] = states_of(path);
   }
   const MeshLimits limits{.reading = request.run.memory_bytes,
                           .kept = request.run.memory_bytes,
@@ -241,13 +288,18 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
       throw RequestError("inputs",
                          "a farm builds clouds where they are: build scene files on one "
                          "machine");
-    plan.inputs.push_back({.path = std::filesystem::absolute(cloud.path),
-                           .states = states[std::filesystem::absolute(cloud.path)],
-                           .points = cloud.points,
-                           .channels = cloud.channels,
-                           .taken = cloud.taken});
+    const std::filesystem::path path = std::filesystem::absolute(cloud.path);
+    const std::uint64_t shares = shares_of(cloud, request.selection, options.share_points);
+    for (std::uint64_t i = 0; i < shares; ++i) {
+      const std::uint64_t first = cloud.points * i / shares;
+      plan.inputs.push_back({.path = path,
+                             .first = first,
+                             .points = cloud.points * (i + 1) / shares - first,
+                             .channels = cloud.channels,
+                             .taken = cloud.taken});
+    }
   }
-  if (request.city_points > 0) plan.inputs = city_shares(request.city_points);
+  if (request.city_points > 0) plan.inputs = city_shares(request.city_points, options.share_points);
   plan.frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high));
   plan.emits = inputs.clouds.emits;
   plan.points = request.city_points + inputs.clouds.points;
@@ -263,9 +315,11 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
     plan.shading->ranges = static_cast<std::size_t>(
         std::clamp<std::uint64_t>(plan.points / kRangePoints, 1, kMaxRanges));
   }
+  require_request(count_tasks(plan) <= kMaxTasks, "bounces",
+                  "the plan has more than 1,000,000 tasks: take fewer parts or bounces");
   require_task_memory(plan, options.memory_bytes);
   add_tasks(plan, options.memory_bytes);
-  for (const FarmInput& input : plan.inputs) require_unchanged(input.states);
+  for (const auto& [path, states] : plan.files) require_unchanged(states);
   for (FarmTask& task : plan.tasks) task.command = options.command(plan, task);
   return plan;
 }

@@ -4,8 +4,10 @@
 //   route.0 ...      an input --> its points by range                   scene.parts/route.0
 //   part.0 ...       a range of all inputs --> sorted, built            scene.parts/0.ptcx, its
 //   join             edges of all parts --> the top of the tree         scene.ptcx
+//   tune             pilots --> settings that meet the error            scene.parts/tune
 //   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
 //   collect          the light of all ranges --> shaded points          shaded.ply
+//                    (where ranges have files of their own: nothing)
 //
 // A scene that is lit is built under another name first, and so is one for each bounce but the
 // last:
@@ -25,6 +27,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -43,13 +46,23 @@
 namespace ptc {
 
 /// The kinds of tasks, in the order in which they run.
-enum class TaskKind { route, part, join, light, join_light, bounce, join_bounce, shade, collect };
+enum class TaskKind {
+  route,
+  part,
+  join,
+  light,
+  join_light,
+  bounce,
+  join_bounce,
+  tune,
+  shade,
+  collect
+};
 
 /// All kinds.
 inline constexpr std::array kTaskKinds{
-    TaskKind::route,       TaskKind::part,       TaskKind::join,
-    TaskKind::light,       TaskKind::join_light, TaskKind::bounce,
-    TaskKind::join_bounce, TaskKind::shade,      TaskKind::collect};
+    TaskKind::route,  TaskKind::part,        TaskKind::join, TaskKind::light, TaskKind::join_light,
+    TaskKind::bounce, TaskKind::join_bounce, TaskKind::tune, TaskKind::shade, TaskKind::collect};
 
 /// Returns the name of a kind, "route".
 [[nodiscard]] const char* name_of(TaskKind kind) noexcept;
@@ -80,22 +93,28 @@ struct FarmTask {
   [[nodiscard]] std::string name() const;
 };
 
-/// What a task of the kind route takes: a cloud of the plan, as it was measured, or some blocks of
-/// the city.
+/// What a task of the kind route takes: a cloud of the plan, as it was measured, or a share of it,
+/// or some blocks of the city.
 struct FarmInput {
-  std::filesystem::path path;      ///< empty: the city
-  std::vector<InputState> states;  ///< of the file and its parts, before it was measured
-  CityBlocks blocks;               ///< of the city
-  std::uint64_t points = 0;        ///< of the city, about
-  std::vector<Channel> channels;   ///< in the order of its rows
-  std::vector<bool> taken;         ///< as for AttributePlan::add_input()
+  std::filesystem::path path;     ///< empty: the city
+  CityBlocks blocks;              ///< of the city
+  std::uint64_t first = 0;        ///< number in the file of the first point of a share
+  std::uint64_t points = 0;       ///< of the share; of the city, about
+  std::vector<Channel> channels;  ///< in the order of its rows
+  std::vector<bool> taken;        ///< as for AttributePlan::add_input()
 };
+
+inline constexpr std::size_t kMaxParts = 10'000;     ///< of a plan
+inline constexpr std::size_t kMaxRanges = 10'000;    ///< of the points of a plan, to shade
+inline constexpr std::size_t kMaxTasks = 1'000'000;  ///< of a plan
 
 /// How the points of the scene are shaded, when they are.
 struct FarmShading {
-  std::filesystem::path target;  ///< file of points
-  ShadeRequest request;          ///< settings; the scene is that of the plan
-  std::size_t ranges = 0;        ///< 0: one for each million points
+  /// File of points; with a mark for a number in its name, as frame_name() takes it, a file for
+  /// each range.
+  std::filesystem::path target;
+  ShadeRequest request;    ///< settings; the scene is that of the plan
+  std::size_t ranges = 0;  ///< 0: one for each million points
 };
 
 struct FarmPlan;
@@ -109,7 +128,8 @@ struct FarmOptions {
   TaskCommand command;
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
-  std::optional<LightRequest> lighting;                 ///< as of FarmPlan
+  std::uint64_t share_points = 4'000'000;  ///< that a task routes, of a container or the city
+  std::optional<LightRequest> lighting;    ///< as of FarmPlan
   std::optional<FarmShading> shading;
 };
 
@@ -120,6 +140,8 @@ struct FarmPlan {
   std::uint64_t id = 0;         ///< hash of the file, which what tasks write names
   BuildRequest request;         ///< how points are stored, and which are taken
   std::vector<FarmInput> inputs;
+  /// The states of the files of inputs and of their parts, before they were measured.
+  std::map<std::filesystem::path, std::vector<InputState>> files;
   Frame frame;
   bool emits = false;
   std::uint64_t points = 0;  ///< expected
@@ -135,6 +157,10 @@ struct FarmPlan {
   [[nodiscard]] std::size_t parts() const noexcept { return cuts.size() + 1; }
   /// Returns the folder of the parts, "scene.parts".
   [[nodiscard]] std::filesystem::path folder() const;
+  /// Says whether an input is a share of a file that others have shares of.
+  [[nodiscard]] bool is_divided(std::size_t input) const;
+  /// Says whether each range that is shaded gets a file of points of its own.
+  [[nodiscard]] bool has_tiles() const;
   /// Returns how many bounces are made of all points before a range is shaded.
   [[nodiscard]] unsigned waves() const noexcept;
   /// Returns the file that a task writes.

@@ -1,6 +1,7 @@
 #include "engine/pipeline/farm/plan_checks.h"
 
 #include <algorithm>
+#include <set>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -64,6 +65,9 @@ void check_plan_paths(const BuildRequest& request, const FarmPlan& plan) {
     if (has_control_characters(path))
       throw RequestError("inputs", path.string() + ": a path has no control characters in a farm");
   }
+  std::set<std::string> tiles;
+  for (std::size_t i = 0; plan.has_tiles() && i < kMaxRanges; ++i)
+    tiles.insert(plan.output({TaskKind::shade}, i).filename().string());
   for (const std::filesystem::path& input : request.inputs) {
     for (const std::filesystem::path& file : files_of(input)) {
       const std::string what = file == input ? "an input" : "a part of " + input.string();
@@ -74,7 +78,13 @@ void check_plan_paths(const BuildRequest& request, const FarmPlan& plan) {
       };
       if (same_file(file, plan.scene)) refuse(plan.scene);
       if (same_file(file, plan.file)) refuse(plan.file);
-      if (plan.shading && same_file(file, plan.shading->target)) refuse(plan.shading->target);
+      if (plan.has_tiles()) {
+        if (same_file(directory_of(file), directory_of(plan.shading->target)) &&
+            tiles.contains(file.filename().string()))
+          refuse(file);
+      } else if (plan.shading && same_file(file, plan.shading->target)) {
+        refuse(plan.shading->target);
+      }
       if (lies_in(file, plan.folder())) refuse(plan.folder());
     }
   }

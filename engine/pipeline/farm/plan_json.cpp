@@ -169,6 +169,7 @@ OrderedJson to_json(const FarmShading& shading) {
                    {"cone", around.cone},
                    {"falloff", around.falloff}};
   if (std::isfinite(around.distance)) json["distance"] = around.distance;
+  if (request.error) json["error"] = *request.error;
   return json;
 }
 
@@ -193,6 +194,7 @@ FarmShading shading_of(const OrderedJson& json) {
   gather.around.cone = json.at("cone");
   gather.around.falloff = json.at("falloff");
   if (json.contains("distance")) gather.around.distance = json.at("distance");
+  if (json.contains("error")) request.error = json.at("error").get<double>();
   return shading;
 }
 
@@ -245,12 +247,14 @@ FarmPlan plan_of(const OrderedJson& json) {
   for (const OrderedJson& input : json.at("inputs")) {
     plan.inputs.push_back(
         {.path = input.at("path").get<std::string>(),
-         .states = states_of(input.at("files")),
          .blocks = {.first = input.at("blocks").at(0), .end = input.at("blocks").at(1)},
+         .first = input.at("first"),
          .points = input.at("points"),
          .channels = channels_of(input.at("channels")),
          .taken = input.at("taken").get<std::vector<bool>>()});
   }
+  for (const OrderedJson& file : json.at("files"))
+    plan.files[file.at("path").get<std::string>()] = states_of(file.at("states"));
   plan.meta = {channels_of(json.at("channels")),
                json.at("texts").get<std::map<std::string, std::string>>()};
   for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
@@ -263,16 +267,18 @@ FarmPlan plan_of(const OrderedJson& json) {
 }  // namespace
 
 std::string plan_to_json(const FarmPlan& plan) {
-  OrderedJson inputs = OrderedJson::array(), cuts = OrderedJson::array(),
-              tasks = OrderedJson::array();
+  OrderedJson inputs = OrderedJson::array(), files = OrderedJson::array(),
+              cuts = OrderedJson::array(), tasks = OrderedJson::array();
   for (const FarmInput& input : plan.inputs) {
     inputs.push_back({{"path", input.path.string()},
-                      {"files", to_json(input.states)},
                       {"blocks", {input.blocks.first, input.blocks.end}},
+                      {"first", input.first},
                       {"points", input.points},
                       {"channels", to_json(input.channels)},
                       {"taken", input.taken}});
   }
+  for (const auto& [path, states] : plan.files)
+    files.push_back({{"path", path.string()}, {"states", to_json(states)}});
   for (const MortonKey& cut : plan.cuts) cuts.push_back(to_json(cut));
   for (const FarmTask& task : plan.tasks) tasks.push_back(to_json(task));
   OrderedJson json{{"format", kFormat},
@@ -282,6 +288,7 @@ std::string plan_to_json(const FarmPlan& plan) {
                    {"request", to_json(plan.request)},
                    {"frame", {{"origin", plan.frame.origin}, {"edge", plan.frame.edge}}},
                    {"inputs", inputs},
+                   {"files", files},
                    {"channels", to_json(plan.meta.channels)},
                    {"texts", plan.meta.text},
                    {"cuts", cuts},

@@ -2,8 +2,11 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+
+#include "engine/pipeline/render/shots.h"
 
 namespace ptc {
 namespace {
@@ -13,29 +16,53 @@ namespace {
 constexpr double kRouteSeconds = 2.2e-7, kPartSeconds = 7e-7;
 constexpr double kLightSeconds = 1.8e-4, kBounceSeconds = 1e-4;
 constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;
+constexpr double kTuneSeconds = 300;  // of the task: its pilots are as many for any scene
 constexpr std::uint64_t kStoredBytes = 26, kResultBytes = 40;
 
+/// Returns the files of all parts that a step writes: "unlit.*.ptcx".
+std::filesystem::path all_parts(const FarmPlan& plan, const TaskStep& step) {
+  const std::string first = plan.output(step, 0).filename().string();
+  return plan.folder() / (first.substr(0, first.rfind("0.ptcx")) + "*.ptcx");
+}
+
+/// Adds the files of a scene of parts to those that a task reads.
+/// @param parts, join  the steps that write them
+void add_scene(const FarmPlan& plan, const TaskStep& parts, const TaskStep& join,
+               std::vector<std::filesystem::path>& inputs) {
+  inputs.push_back(plan.output(join, 0));
+  inputs.push_back(all_parts(plan, parts));
+}
+
+/// Adds the files of the scene of a plan, lit if it is.
+void add_final_scene(const FarmPlan& plan, std::vector<std::filesystem::path>& inputs) {
+  if (plan.lighting) {
+    add_scene(plan, {TaskKind::light}, {TaskKind::join_light}, inputs);
+  } else {
+    add_scene(plan, {TaskKind::part}, {TaskKind::join}, inputs);
+  }
+}
+
 /// Adds a task for each part of the scene, and one that joins what they write.
+/// @param inputs   of each
 /// @param after    whose tasks they need
 /// @param seconds  of a point
 void add_parts(FarmPlan& plan, const TaskStep& step, const TaskStep& join, const TaskStep& after,
-               std::uint64_t memory_bytes, double seconds) {
+               const std::vector<std::filesystem::path>& inputs, std::uint64_t memory_bytes,
+               double seconds) {
   const std::uint64_t points = plan.points / plan.parts();
   for (std::size_t i = 0; i < plan.parts(); ++i) {
-    FarmTask& task = plan.tasks.emplace_back(FarmTask{.step = step, .number = i});
-    task.after = after;
-    task.inputs = {step.kind == TaskKind::part ? plan.folder() / "route.*" : plan.output(after, 0)};
-    if (step.wave > 1) task.inputs.push_back(plan.scene);
-    task.outputs = {plan.output(step, i)};
-    task.memory_bytes = memory_bytes;
-    task.disk_bytes = points * kStoredBytes;
-    task.seconds = static_cast<double>(points) * seconds;
+    plan.tasks.push_back({.step = step,
+                          .number = i,
+                          .after = after,
+                          .inputs = inputs,
+                          .outputs = {plan.output(step, i)},
+                          .memory_bytes = memory_bytes,
+                          .disk_bytes = points * kStoredBytes,
+                          .seconds = static_cast<double>(points) * seconds});
   }
-  const std::string first = plan.output(step, 0).filename().string();  // "unlit.0.ptcx"
-  const std::string all = first.substr(0, first.rfind("0.ptcx")) + "*.ptcx";
   plan.tasks.push_back({.step = join,
                         .after = step,
-                        .inputs = {plan.folder() / all},
+                        .inputs = {all_parts(plan, step)},
                         .outputs = {plan.output(join, 0)},
                         .memory_bytes = memory_bytes,
                         .disk_bytes = plan.parts() * 4096,
@@ -47,19 +74,46 @@ void add_parts(FarmPlan& plan, const TaskStep& step, const TaskStep& join, const
 TaskStep add_light(FarmPlan& plan, std::uint64_t memory_bytes) {
   TaskStep last{TaskKind::join};
   if (plan.lighting) {
-    add_parts(plan, {TaskKind::light}, {TaskKind::join_light}, last, memory_bytes, kLightSeconds);
+    std::vector<std::filesystem::path> inputs;
+    add_scene(plan, {TaskKind::part}, last, inputs);
+    const std::string& picture = plan.lighting->lights.value().sky.map_path;
+    if (!picture.empty()) inputs.emplace_back(picture);
+    add_parts(plan, {TaskKind::light}, {TaskKind::join_light}, last, inputs, memory_bytes,
+              kLightSeconds);
     last = {TaskKind::join_light};
   }
   for (unsigned wave = 1; wave <= plan.waves(); ++wave) {
-    const TaskStep join{TaskKind::join_bounce, wave};
-    add_parts(plan, {TaskKind::bounce, wave}, join, last, memory_bytes, kBounceSeconds);
+    const TaskStep step{TaskKind::bounce, wave}, join{TaskKind::join_bounce, wave};
+    std::vector<std::filesystem::path> inputs;
+    add_final_scene(plan, inputs);
+    if (wave > 1) add_scene(plan, {TaskKind::bounce, wave - 1}, last, inputs);
+    add_parts(plan, step, join, last, inputs, memory_bytes, kBounceSeconds);
     last = join;
   }
   return last;
 }
 
-/// Adds the tasks that shade ranges of the scene, and one that collects their results.
+/// Adds the tasks that shade ranges of the scene, one that chooses the settings where an error is
+/// asked for, and one that collects the results.
 void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_bytes) {
+  // Choose the settings
+  TaskStep before = after;
+  std::vector<std::filesystem::path> seen;
+  add_final_scene(plan, seen);
+  if (plan.waves() > 0) add_scene(plan, {TaskKind::bounce, plan.waves()}, after, seen);
+  if (plan.shading->request.error) {
+    before = {TaskKind::tune};
+    plan.tasks.push_back({.step = before,
+                          .after = after,
+                          .inputs = seen,
+                          .outputs = {plan.output(before, 0)},
+                          .memory_bytes = memory_bytes,
+                          .disk_bytes = 256,
+                          .seconds = kTuneSeconds});
+    seen.push_back(plan.output(before, 0));
+  }
+
+  // Shade the ranges, and collect their results
   const std::size_t ranges = plan.shading->ranges;
   const std::uint64_t points = plan.points / ranges;
   FarmTask collect{.step = {TaskKind::collect},
@@ -69,14 +123,20 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
                    .memory_bytes = memory_bytes,
                    .disk_bytes = plan.points * 2 * kResultBytes,
                    .seconds = static_cast<double>(plan.points) * kCollectSeconds};
+  std::uint64_t result_bytes = kResultBytes;
+  if (plan.has_tiles()) {  // there is nothing to collect, but the bounces go
+    result_bytes = 2 * kResultBytes;
+    collect.inputs = {plan.shading->target};
+    collect.disk_bytes = 0;
+    collect.seconds = 0.01;
+  }
   for (std::size_t i = 0; i < ranges; ++i) {
     FarmTask& task = plan.tasks.emplace_back(FarmTask{.step = {TaskKind::shade}, .number = i});
-    task.after = after;
-    task.inputs = {plan.scene};
-    if (plan.waves() > 0) task.inputs.push_back(plan.output(after, 0));
+    task.after = before;
+    task.inputs = seen;
     task.outputs = {plan.output(task.step, i)};
     task.memory_bytes = memory_bytes;
-    task.disk_bytes = points * kResultBytes;
+    task.disk_bytes = points * result_bytes;
     task.seconds = static_cast<double>(points) * kShadeSeconds;
   }
   plan.tasks.push_back(std::move(collect));
@@ -100,6 +160,8 @@ const char* name_of(TaskKind kind) noexcept {
       return "bounce";
     case TaskKind::join_bounce:
       return "join_bounce";
+    case TaskKind::tune:
+      return "tune";
     case TaskKind::shade:
       return "shade";
     case TaskKind::collect:
@@ -114,12 +176,21 @@ std::string TaskStep::name() const {
 
 std::string FarmTask::name() const {
   const bool one = step.kind == TaskKind::join || step.kind == TaskKind::join_light ||
-                   step.kind == TaskKind::join_bounce || step.kind == TaskKind::collect;
+                   step.kind == TaskKind::join_bounce || step.kind == TaskKind::tune ||
+                   step.kind == TaskKind::collect;
   return one ? step.name() : fmt::format("{}.{}", step.name(), number);
 }
 
 std::filesystem::path FarmPlan::folder() const {
   return scene.parent_path() / (scene.stem().string() + ".parts");
+}
+
+bool FarmPlan::is_divided(std::size_t input) const {
+  return inputs[input].first > 0 || (input + 1 < inputs.size() && inputs[input + 1].first > 0);
+}
+
+bool FarmPlan::has_tiles() const {
+  return shading && frame_name(shading->target, 0).has_value();
 }
 
 unsigned FarmPlan::waves() const noexcept {
@@ -128,8 +199,10 @@ unsigned FarmPlan::waves() const noexcept {
 
 std::filesystem::path FarmPlan::output(const TaskStep& step, std::size_t number) const {
   switch (step.kind) {
-    case TaskKind::route:
     case TaskKind::shade:
+      if (has_tiles()) return *frame_name(shading->target, static_cast<std::int64_t>(number));
+      [[fallthrough]];
+    case TaskKind::route:
       return folder() / fmt::format("{}.{}", step.name(), number);
     case TaskKind::part:
       return folder() / fmt::format("{}{}.ptcx", lighting ? "unlit." : "", number);
@@ -139,6 +212,8 @@ std::filesystem::path FarmPlan::output(const TaskStep& step, std::size_t number)
       return folder() / fmt::format("{}.{}.ptcx", step.name(), number);
     case TaskKind::join_bounce:
       return folder() / (TaskStep{TaskKind::bounce, step.wave}.name() + ".ptcx");
+    case TaskKind::tune:
+      return folder() / "tune";
     case TaskKind::collect:
       return shading.value().target;
     case TaskKind::join:
@@ -164,8 +239,8 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
   }
 
   // Build each range of all of them, join the parts, and light and shade what they are
-  add_parts(plan, {TaskKind::part}, {TaskKind::join}, {TaskKind::route}, memory_bytes,
-            kPartSeconds);
+  add_parts(plan, {TaskKind::part}, {TaskKind::join}, {TaskKind::route},
+            {plan.folder() / "route.*"}, memory_bytes, kPartSeconds);
   const TaskStep lit = add_light(plan, memory_bytes);
   if (plan.shading) add_shading(plan, lit, memory_bytes);
 }

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "engine/io/file/state_file.h"
 #include "engine/io/file/text_file.h"
@@ -11,16 +15,33 @@
 namespace ptc {
 namespace {
 
+/// Returns the mark of a task. Tasks of two plans that write one file have one mark, so that what
+/// the other plan wrote is not taken for what this one did.
 std::filesystem::path done_mark(const FarmPlan& plan, const FarmTask& task) {
-  return plan.folder() / "done" / task.name();
+  const auto mark = [&]() -> std::string {
+    switch (task.step.kind) {
+      case TaskKind::part:
+        return fmt::format("{}.{}", plan.lighting ? "unlit" : "part", task.number);
+      case TaskKind::join:
+        return plan.lighting ? "unlit" : "join";
+      case TaskKind::light:
+        return fmt::format("part.{}", task.number);
+      case TaskKind::join_light:
+        return "join";
+      default:
+        return task.name();
+    }
+  };
+  return plan.folder() / "done" / mark();
 }
 
 std::filesystem::path failed_mark(const FarmPlan& plan, const FarmTask& task) {
   return plan.folder() / "failed" / task.name();
 }
 
-/// Returns whether a task has written its output; nothing when it is not marked as done.
-std::optional<bool> written(const FarmPlan& plan, const FarmTask& task) {
+/// Returns the plan of a mark, and whether the task has written its output; nothing without a mark.
+std::optional<std::pair<std::uint64_t, bool>> read_mark(const FarmPlan& plan,
+                                                        const FarmTask& task) {
   const std::filesystem::path mark = done_mark(plan, task);
   std::vector<std::byte> bytes;
   try {
@@ -30,8 +51,15 @@ std::optional<bool> written(const FarmPlan& plan, const FarmTask& task) {
     return std::nullopt;
   }
   StateReader state(bytes, mark.string());
-  if (state.get<std::uint64_t>() != plan.id) return std::nullopt;
-  return state.get<std::uint8_t>() != 0;
+  const auto id = state.get<std::uint64_t>();
+  return std::pair(id, state.get<std::uint8_t>() != 0);
+}
+
+/// Returns whether a task has written its output; nothing when it is not marked as done.
+std::optional<bool> written(const FarmPlan& plan, const FarmTask& task) {
+  const auto mark = read_mark(plan, task);
+  if (!mark || mark->first != plan.id) return std::nullopt;
+  return mark->second;
 }
 
 }  // namespace
@@ -50,11 +78,17 @@ void mark_done(const FarmPlan& plan, const FarmTask& task, bool has_output) {
   write_shared_state(done_mark(plan, task), state.take());
 }
 
-bool is_done(const FarmPlan& plan, const FarmTask& task) {
-  const std::optional<bool> has_output = written(plan, task);
+void forget_other_plans(const FarmPlan& plan, const FarmTask& task) {
+  const auto mark = read_mark(plan, task);
+  if (mark && mark->first != plan.id) std::filesystem::remove(done_mark(plan, task));
+}
+
+bool TaskMarks::is_done(const FarmTask& task) {
+  const std::optional<bool> has_output = written(plan_, task);
   if (!has_output) return false;
-  if (!*has_output || std::filesystem::exists(task.outputs.at(0))) return true;
-  return is_spent(plan, task);
+  // A range that is shaded again needs bounces, which this task removes again
+  if (task.step.kind == TaskKind::collect && plan_.has_tiles()) return all_done(TaskKind::shade);
+  return !*has_output || std::filesystem::exists(task.outputs.at(0)) || is_spent(task);
 }
 
 bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed) {
@@ -70,9 +104,12 @@ std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task) {
     case TaskKind::part:
     case TaskKind::join:
       return plan.lighting ? std::optional(TaskKind::light) : std::nullopt;
+    case TaskKind::shade:
+      if (plan.has_tiles()) break;
+      [[fallthrough]];
     case TaskKind::bounce:
     case TaskKind::join_bounce:
-    case TaskKind::shade:
+    case TaskKind::tune:
       return TaskKind::collect;
     case TaskKind::light:
     case TaskKind::join_light:
@@ -82,16 +119,21 @@ std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task) {
   return std::nullopt;
 }
 
-bool is_spent(const FarmPlan& plan, const FarmTask& task) {
-  const std::optional<TaskKind> user = last_user(plan, task);
-  return user && std::ranges::all_of(plan.tasks, [&](const FarmTask& other) {
-           return other.step.kind != *user || is_done(plan, other);
-         });
+bool TaskMarks::is_spent(const FarmTask& task) {
+  const std::optional<TaskKind> user = last_user(plan_, task);
+  return user && all_done(*user);
 }
 
-TaskState state_of(const FarmPlan& plan, const FarmTask& task) {
-  if (is_done(plan, task)) return TaskState::done;
-  return std::filesystem::exists(failed_mark(plan, task)) ? TaskState::failed : TaskState::waiting;
+bool TaskMarks::all_done(TaskKind kind) {
+  if (const auto found = all_done_.find(kind); found != all_done_.end()) return found->second;
+  const bool all = std::ranges::all_of(
+      plan_.tasks, [&](const FarmTask& task) { return task.step.kind != kind || is_done(task); });
+  return all_done_[kind] = all;
+}
+
+TaskState TaskMarks::state(const FarmTask& task) {
+  if (is_done(task)) return TaskState::done;
+  return std::filesystem::exists(failed_mark(plan_, task)) ? TaskState::failed : TaskState::waiting;
 }
 
 std::string failure_of(const FarmPlan& plan, const FarmTask& task) {

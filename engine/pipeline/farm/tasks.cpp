@@ -14,6 +14,7 @@
 #include "engine/io/file/temporary_name.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/farm/build_tasks.h"
+#include "engine/pipeline/farm/tuning_file.h"
 #include "engine/pipeline/light/light_container.h"
 #include "engine/pipeline/parts/join_parts.h"
 #include "engine/pipeline/parts/part_edges.h"
@@ -24,18 +25,61 @@
 namespace ptc {
 namespace {
 
-/// Removes what nobody needs when the tasks of a kind are done, and temporary files that killed
-/// tasks have left. A second process of a task that is done may still need them: its task ends well
-/// for all that (run_task()).
-void remove_leftovers(const FarmPlan& plan, TaskKind user) {
+/// Removes a part and its edges, as far as they are there.
+void remove_part(const std::filesystem::path& path) {
   std::error_code gone;
-  for (const FarmTask& task : plan.tasks) {
-    if (last_user(plan, task) != user) continue;
-    const std::filesystem::path& output = task.outputs.at(0);
-    std::filesystem::remove(output, gone);
-    if (task.step.kind == TaskKind::part || task.step.kind == TaskKind::bounce)
-      std::filesystem::remove(edges_path(output), gone);
+  std::filesystem::remove(path, gone);
+  std::filesystem::remove(edges_path(path), gone);
+}
+
+/// Removes what a task wrote, when its last users are done. A second process of a user may still
+/// need it: its task ends well for all that (run_task()).
+void remove_output(const FarmTask& task) {
+  std::error_code gone;
+  const std::filesystem::path& output = task.outputs.at(0);
+  switch (task.step.kind) {
+    case TaskKind::part:
+    case TaskKind::bounce:
+      return remove_part(output);
+    case TaskKind::tune:
+      return;  // it says which error the points have
+    default:
+      std::filesystem::remove(output, gone);
   }
+}
+
+/// Says whether what others wrote may be spent by a task: it joins or collects, or it makes a part
+/// again behind a join.
+bool may_spend(const FarmPlan& plan, const FarmTask& task, TaskMarks& marks) {
+  const auto is_done = [&](const TaskStep& step) {
+    const auto found = std::ranges::find(plan.tasks, step, &FarmTask::step);
+    return found != plan.tasks.end() && marks.is_done(*found);
+  };
+  switch (task.step.kind) {
+    case TaskKind::join:
+    case TaskKind::join_light:
+    case TaskKind::collect:
+      return true;
+    case TaskKind::part:
+      return is_done({TaskKind::join});
+    case TaskKind::light:
+      return is_done({TaskKind::join_light});
+    default:
+      return false;
+  }
+}
+
+/// Removes what nobody needs any more behind a task, and temporary files that killed tasks have
+/// left.
+void remove_leftovers(const FarmPlan& plan, const FarmTask& task) {
+  TaskMarks marks(plan);
+  // A second process of a task may come later than those who need its output
+  if (marks.is_spent(task)) remove_output(task);
+  if (!may_spend(plan, task, marks)) return;
+  for (const FarmTask& other : plan.tasks) {
+    if (marks.is_spent(other)) remove_output(other);
+  }
+  std::error_code gone;
   for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
     if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
   }
@@ -72,7 +116,10 @@ bool light(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Pr
   const std::filesystem::path& target = task.outputs.at(0);
   const std::optional<std::size_t> part =
       index_of(plan, {TaskKind::part}, task.number, request.scene);
-  if (!part) return false;
+  if (!part) {
+    remove_part(target);
+    return false;
+  }
   Sky& sky = request.lights.value().sky;
   const auto store = texture_store(run, target);
   if (load_sky_map(sky, directory_of(plan.file), *store) == SkyMap::changed)
@@ -93,7 +140,10 @@ bool bounce(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, P
   ShadeRequest request = shading_of(plan, run);
   const TaskStep parts{plan.lighting ? TaskKind::light : TaskKind::part};
   const std::optional<std::size_t> part = index_of(plan, parts, task.number, request.scene);
-  if (!part) return false;
+  if (!part) {
+    remove_part(task.outputs.at(0));
+    return false;
+  }
   request.bounces = task.step.wave;
   if (task.step.wave > 1)
     request.bounced = plan.output({TaskKind::join_bounce, task.step.wave - 1}, 0);
@@ -101,10 +151,37 @@ bool bounce(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, P
   return true;
 }
 
-void shade(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
+/// Chooses the settings that meet the error.
+void tune(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
   ShadeRequest request = shading_of(plan, run);
   if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
-  shade_range(request, {task.number, plan.shading->ranges}, plan.id, task.outputs.at(0), progress);
+  write_tuning(plan, choose_settings(request, task.outputs.at(0), progress));
+}
+
+/// Returns the request that shades with the settings that were chosen.
+ShadeRequest tuned_shading_of(const FarmPlan& plan, const RunOptions& run) {
+  ShadeRequest request = shading_of(plan, run);
+  if (!request.error) return request;
+  const TuningReport tuning = read_tuning(plan);
+  request.error.reset();
+  request.receiver_rays = tuning.receiver_rays;
+  GatherOptions& gather = request.gather;
+  gather.solid_angle = tuning.gather.solid_angle;
+  gather.parallax = tuning.gather.parallax;
+  gather.inflation = tuning.gather.inflation;
+  gather.resolution = tuning.gather.resolution;
+  return request;
+}
+
+/// Shades a range. @return  whether it has written a file
+bool shade(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
+  ShadeRequest request = tuned_shading_of(plan, run);
+  if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
+  const RangeNumber range{task.number, plan.shading->ranges};
+  const std::filesystem::path& target = task.outputs.at(0);
+  if (plan.has_tiles()) return shade_tile(request, range, target, progress);
+  shade_range(request, range, plan.id, target, progress);
+  return true;
 }
 
 /// Writes the shaded points.
@@ -112,7 +189,7 @@ void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
   std::vector<std::filesystem::path> results;
   for (std::size_t i = 0; i < plan.shading->ranges; ++i)
     results.push_back(plan.output({TaskKind::shade}, i));
-  collect_shading(shading_of(plan, run), results, plan.id, plan.shading->target, progress);
+  collect_shading(tuned_shading_of(plan, run), results, plan.id, plan.shading->target, progress);
 }
 
 /// Does a task. @return  whether it has written its output
@@ -130,31 +207,26 @@ bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     case TaskKind::bounce:
       return bounce(plan, task, run, progress);
     case TaskKind::join:
-      join(plan, task, run, progress);
-      remove_leftovers(plan, TaskKind::part);
-      break;
     case TaskKind::join_light:
-      join(plan, task, run, progress);
-      remove_leftovers(plan, TaskKind::light);
-      break;
     case TaskKind::join_bounce:
       join(plan, task, run, progress);
       break;
+    case TaskKind::tune:
+      tune(plan, task, run, progress);
+      break;
     case TaskKind::shade:
-      shade(plan, task, run, progress);
-      break;
+      return shade(plan, task, run, progress);
     case TaskKind::collect:
-      collect(plan, run, progress);
-      remove_leftovers(plan, TaskKind::collect);
-      break;
+      if (!plan.has_tiles()) collect(plan, run, progress);
+      return !plan.has_tiles();
   }
   return true;
 }
 
 /// Refuses a task before its time.
-void require_forerunners(const FarmPlan& plan, const FarmTask& task) {
+void require_forerunners(const FarmPlan& plan, const FarmTask& task, TaskMarks& marks) {
   for (const FarmTask& before : plan.tasks) {
-    if (before.step == task.after && !is_done(plan, before)) fail_unseen(plan, task, before.name());
+    if (before.step == task.after && !marks.is_done(before)) fail_unseen(plan, task, before.name());
   }
 }
 
@@ -164,9 +236,11 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
               Progress& progress) {
   bool performed = false;
   try {
-    if (is_done(plan, task)) return false;
-    require_forerunners(plan, task);
+    TaskMarks marks(plan);
+    if (marks.is_done(task)) return false;
+    require_forerunners(plan, task, marks);
     forget_failure(plan, task);
+    forget_other_plans(plan, task);
     const bool has_output = perform(plan, task, run, progress);
     performed = true;
     mark_done(plan, task, has_output);
@@ -174,12 +248,11 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     throw;
   } catch (const std::exception& error) {
     // Another process may have done the task in the meantime, and join removed what this one needed
-    if (!performed && is_done(plan, task)) return false;
+    if (!performed && TaskMarks(plan).is_done(task)) return false;
     note_failure(plan, task, error.what());
     throw;
   }
-  if (is_spent(plan, task))  // a second process of it was later than those who need its output
-    std::filesystem::remove(task.outputs.at(0));
+  remove_leftovers(plan, task);
   return true;
 }
 

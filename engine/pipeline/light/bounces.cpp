@@ -38,11 +38,10 @@ class BouncedPoints : public RelitPoints {
  public:
   BouncedPoints(const ContainerReader& first, const PointRange& range, Shader& shader, float lift,
                 Progress& progress)
-      : RelitPoints(first, range),
+      : RelitPoints(first, range, progress),
         frame_(first.header().frame),
         shader_(shader),
         lift_(lift),
-        progress_(progress),
         receivers_(kBatch),
         results_(kBatch) {}
 
@@ -53,8 +52,9 @@ class BouncedPoints : public RelitPoints {
     for (std::size_t i = 0; i < records.size(); ++i)
       receivers_[i] = lifted(to_surfel(records[i], frame_), lift_, frame_);
     const double before = ptc::cpu_seconds();
+    Progress silent;
     shader_.shade(std::span(receivers_).first(records.size()),
-                  std::span(results_).first(records.size()), progress_);
+                  std::span(results_).first(records.size()), silent);
     cpu_ += ptc::cpu_seconds() - before;
 
     // Add the light that they reflect
@@ -73,7 +73,6 @@ class BouncedPoints : public RelitPoints {
   Frame frame_;
   Shader& shader_;
   float lift_;
-  Progress& progress_;
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
   double cpu_ = 0;

@@ -76,7 +76,7 @@ class LitPoints : public RelitPoints {
   /// @param sky  null: the sky is black
   LitPoints(const ContainerReader& scene, const PointRange& range, DiscLight* lights, Shader* sky,
             const LightRequest& request, LightReport& report, Progress& progress)
-      : RelitPoints(scene, range),
+      : RelitPoints(scene, range, progress),
         frame_(scene.header().frame),
         rises_(scene),
         lights_(lights),
@@ -84,7 +84,6 @@ class LitPoints : public RelitPoints {
         lift_(request.lift),
         emission_(request.emission),
         report_(report),
-        progress_(progress),
         surfels_(kBatch),
         receivers_(sky ? kBatch : 0),
         heights_(kBatch),
@@ -117,7 +116,6 @@ class LitPoints : public RelitPoints {
       sky_->shade(std::span(receivers_).first(count), std::span(shading_).first(count), silent);
       report_.sky_cpu_seconds += ptc::cpu_seconds() - middle;
     }
-    progress_.advance(count);
     // Set what they reflect
     for (std::size_t i = 0; i < count; ++i) {
       PointRecord& record = records[i];
@@ -139,7 +137,6 @@ class LitPoints : public RelitPoints {
   float lift_;
   bool emission_;
   LightReport& report_;
-  Progress& progress_;
   std::vector<Surfel> surfels_;
   std::vector<Receiver> receivers_;
   std::vector<float> heights_;

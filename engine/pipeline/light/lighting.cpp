@@ -27,6 +27,11 @@ namespace {
 
 /// @throws RequestError when parts of the request exclude each other
 void check_combination(const LightingRequest& request) {
+  require_request(request.receiver_rays == 0 || (!request.error && !request.estimate),
+                  "receiver_rays", "rays that shade the receivers exclude `error` and `estimate`");
+  require_request(request.receiver_rays == 0 || request.gather.around.is_plain(), "receiver_rays",
+                  "rays that shade the receivers see the hemisphere at any distance: leave out the "
+                  "limits of the occlusion");
   const bool traces_rays = request.error || request.check.receivers > 0;
   if (request.estimate && !traces_rays) {
     throw RequestError("estimate",
@@ -116,6 +121,8 @@ void check_ranges(const LightingRequest& request) {
                   "`gather.around.diagonals` is not 0 or more and finite");
   require_request(around.falloff <= 8, "gather.around.falloff",
                   "`gather.around.falloff` is above 8");
+  require_request(request.receiver_rays <= kMaxRays, "receiver_rays",
+                  "a receiver has more than 16777216 rays");
   require_request(!request.error || (*request.error > 0 && *request.error <= 1), "error",
                   "`error` is not above 0 and at most 1");
   require_request(request.check.rays >= 1 && request.check.rays <= kMaxRays, "check.rays",
@@ -265,7 +272,7 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
   const std::array all{receivers.size()};
   if (counts.empty()) counts = all;
   results_.resize(receivers.size());
-  const std::uint64_t seed = kRunSeed + report_.receivers - shaded_before_;
+  const std::uint64_t seed = kRunSeed + first_ + report_.receivers - shaded_before_;
   const double before = cpu_seconds();
   if (receiver_rays() > 0) {
     rays_->trace(receivers, receiver_rays(), seed, results_, progress_);

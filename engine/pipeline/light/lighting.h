@@ -72,6 +72,9 @@ struct LightingRequest {
   /// Error to meet, above 0 and at most 1, as CheckError::relative(); it chooses the settings of
   /// `gather`, or rays in its place (spec/shading.md#error). Empty: `gather` is used as it is.
   std::optional<double> error;
+  /// Rays of each receiver, which take the place of the gather, as TuningReport::receiver_rays; 0:
+  /// the gather shades. Excludes `error` and `estimate`.
+  unsigned receiver_rays = 0;
   /// Estimates the error of every receiver, for about twice the time. Needs `error` or `check`.
   bool estimate = false;
   GlossyRequest glossy;
@@ -161,6 +164,11 @@ class Lighting {
   /// @pre prepare()
   void tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse = false);
 
+  /// Begins a range of a run's receivers: rays are those of a run that has shaded all before it.
+  /// @param first  number of the first receiver of the range
+  /// @pre nothing is shaded yet
+  void begin_range(std::uint64_t first) noexcept { first_ = first; }
+
   /// Begins another picture, in which rays are the same as in the first one.
   /// @param eye  as for prepare()
   void begin_picture(const glm::dvec3& eye) noexcept {
@@ -178,7 +186,7 @@ class Lighting {
   [[nodiscard]] const GatherOptions& gather() const noexcept { return options_.gather; }
   /// The number of rays by which shade() shades a receiver; 0: by the gather.
   [[nodiscard]] unsigned receiver_rays() const noexcept {
-    return report_.tuning ? report_.tuning->receiver_rays : 0;
+    return report_.tuning ? report_.tuning->receiver_rays : request_.receiver_rays;
   }
 
   /// Shades a block of receivers. They should follow the Z-curve from call to call, because
@@ -223,6 +231,7 @@ class Lighting {
   Mirrors mirrors_;
   std::uint64_t mirror_bytes_ = 0;   ///< of rays_ beside a gather
   std::uint64_t shaded_before_ = 0;  ///< receivers of earlier pictures
+  std::uint64_t first_ = 0;          ///< number of the first receiver of a range
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
   std::vector<Reflection> reflections_;

@@ -12,8 +12,12 @@ PointRange points_of(const ContainerReader& scene, std::optional<std::size_t> pa
   return range;
 }
 
-RelitPoints::RelitPoints(const ContainerReader& scene, const PointRange& range)
-    : range_(range), points_(scene), records_(kBatch), batch_(range.first / kBatch * kBatch) {
+RelitPoints::RelitPoints(const ContainerReader& scene, const PointRange& range, Progress& progress)
+    : range_(range),
+      progress_(progress),
+      points_(scene),
+      records_(kBatch),
+      batch_(range.first / kBatch * kBatch) {
   points_.skip(batch_);
 }
 
@@ -32,6 +36,7 @@ std::size_t RelitPoints::next(std::span<PointRecord> out) {
   const std::size_t count = std::min(out.size(), end_ - at_);
   std::copy_n(records_.begin() + static_cast<std::ptrdiff_t>(at_), count, out.begin());
   at_ += count;
+  progress_.advance(count);
   return count;
 }
 

@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include "engine/base/progress.h"
 #include "engine/base/stream.h"
 #include "engine/shade/shader.h"
 #include "engine/store/container_points.h"
@@ -36,8 +37,9 @@ struct PointRange {
 /// them.
 class RelitPoints : public PointStream {
  public:
-  /// @param scene  must outlive this
-  RelitPoints(const ContainerReader& scene, const PointRange& range);
+  /// @param scene     must outlive this
+  /// @param progress  gets the points that are handed out; must outlive this
+  RelitPoints(const ContainerReader& scene, const PointRange& range, Progress& progress);
 
   /// @throws as ContainerPoints::next() and relight()
   std::size_t next(std::span<PointRecord> out) override;
@@ -51,6 +53,7 @@ class RelitPoints : public PointStream {
 
  private:
   PointRange range_;
+  Progress& progress_;
   ContainerPoints points_;
   std::vector<PointRecord> records_;
   std::uint64_t batch_;           ///< number of the first point of the next batch

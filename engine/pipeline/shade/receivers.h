@@ -10,6 +10,7 @@
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/point_marks.h"
+#include "engine/pipeline/quality/pilots.h"
 #include "engine/pipeline/shade/shade_container.h"
 #include "engine/shade/lift.h"
 #include "engine/shade/lost_pages.h"
@@ -57,8 +58,7 @@ class PointCursor {
     const auto passed =
         static_cast<std::uint64_t>((before + wanted - 1) / wanted);  // they hold `from` selected
     share_ = static_cast<std::uint64_t>(Wide{passed} * wanted - before);
-    std::uint64_t left = passed;
-    for (; left > 0 && left >= scan_.next_count(); scan_.skip(1)) left -= scan_.next_count();
+    const std::uint64_t left = scan_.skip_points(passed);
     if (scan_.next()) at_ = static_cast<std::uint32_t>(left);
   }
 
@@ -136,6 +136,13 @@ class Lifting {
   std::size_t row_bytes_;
   RisePlace rise_;
 };
+
+/// Returns pilots that stand for receivers: some of the blocks that are shaded. (A batch is put
+/// along the curve of the scene before it is cut, so the receivers of another container may be cut
+/// a little elsewhere.)
+/// @param wanted  number of receivers, an even selection of the container's points
+[[nodiscard]] std::vector<Pilot> pilots_of(const ContainerReader& container, std::uint64_t wanted,
+                                           float lift);
 
 /// Returns the groups of a container's channels that a file of its shaded points takes over: all
 /// but those of an earlier shading.

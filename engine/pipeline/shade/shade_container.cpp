@@ -137,30 +137,6 @@ void check_count(const OpenReceivers& receivers, const std::filesystem::path& ta
                      "receivers. Name a .ply, or shade all points");
 }
 
-/// Returns pilots that stand for all receivers: some of the blocks that are shaded. (A batch is put
-/// along the curve of the scene before it is cut, so the receivers of another container may be cut
-/// a little elsewhere.)
-std::vector<Pilot> pilots_of(const OpenReceivers& receivers, float lift) {
-  const ContainerReader& container = receivers.container;
-  const PilotPlan plan = plan_pilots(receivers.points, Shader::kBlock);
-  const std::uint64_t blocks = (receivers.points + Shader::kBlock - 1) / Shader::kBlock;
-  const std::vector<std::uint8_t> groups = rise_groups(container.meta().channels);
-  std::vector<Pilot> pilots;
-  std::vector<Surfel> surfels(std::min<std::uint64_t>(Shader::kBlock, receivers.points));
-  std::vector<std::byte> rows;
-  for (std::size_t i = 0; i < plan.blocks; ++i) {
-    // The middle one of each share of all blocks
-    const std::uint64_t number = (2 * i + 1) * blocks / (2 * plan.blocks);
-    PointCursor cursor(container, groups, receivers.points, number * Shader::kBlock);
-    std::vector<Receiver> block(cursor.next(surfels, &rows));
-    if (block.empty()) continue;
-    Lifting(container.header().frame, cursor.channels(), lift)
-        .place(std::span(surfels).first(block.size()), rows, block);
-    add_pilots(pilots, std::move(block), 0, plan.stretches, 1);
-  }
-  return pilots;
-}
-
 /// Shades all receivers, batch by batch.
 /// @param shadows  null: none are asked for
 void shade_all(const OpenReceivers& receivers, float lift, Lighting& lighting, DiscShadows* shadows,
@@ -216,7 +192,7 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   // The light that emitters gave the scene's own points is in their radiance
   const bool emission = receivers.other || !lit_by_emitters(lighting.scene());
   lighting.prepare(std::move(budget), sky, emission, 1, eye_of(request, lighting.scene()), target);
-  lighting.tune([&] { return pilots_of(receivers, request.lift); });
+  lighting.tune([&] { return pilots_of(receivers.container, receivers.points, request.lift); });
 
   // Shade all receivers into the target
   PointWriteInfo info =

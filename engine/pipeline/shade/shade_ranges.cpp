@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -94,6 +95,43 @@ class RangeResults {
   std::vector<Shading> results_;
 };
 
+/// Divides the memory of a run over the points of its own scene.
+void prepare_points(const ShadeRequest& request, const std::filesystem::path& target,
+                    Lighting& lighting, Progress& progress) {
+  const ContainerReader& scene = lighting.scene();
+  const Sky sky = recorded_lights(scene, request.run, target, progress).sky;
+  lighting.prepare(budget_of(request.run.memory_bytes, "shading"), sky, !lit_by_emitters(scene), 1,
+                   glm::dvec3(0), target);
+}
+
+/// Takes surfels of receivers, the rows of their channels, and their light.
+using TakeLit = std::function<void(std::span<const Surfel> surfels, std::span<const std::byte> rows,
+                                   const LitReceivers& lit)>;
+
+/// Shades receivers batch by batch.
+/// @param groups  of the channels of rows, those of their rises among them
+void shade_receivers(const ShadeRequest& request, const Receivers& receivers,
+                     const std::vector<std::uint8_t>& groups, Lighting& lighting,
+                     const TakeLit& take) {
+  if (receivers.first == receivers.end) return;
+  const ContainerReader& scene = lighting.scene();
+  lighting.begin_range(receivers.first);
+  PointCursor cursor(scene, groups, selected_of(scene, request.count), receivers.first);
+  const Lifting lifting(scene.header().frame, cursor.channels(), request.lift);
+  std::vector<Surfel> surfels(kReceiverBatch);
+  std::vector<Receiver> batch(kReceiverBatch);
+  std::vector<std::byte> rows;
+  for (std::uint64_t at = receivers.first; at < receivers.end;) {
+    const std::size_t count = cursor.next(
+        std::span(surfels).first(std::min<std::uint64_t>(kReceiverBatch, receivers.end - at)),
+        &rows);
+    if (count == 0) throw DataError(request.scene.string() + ": it has fewer points than it says");
+    lifting.place(std::span(surfels).first(count), rows, batch);
+    take(std::span(surfels).first(count), rows, lighting.shade(std::span(batch).first(count)));
+    at += count;
+  }
+}
+
 }  // namespace
 
 void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::path& target) {
@@ -102,12 +140,23 @@ void check_shade_by_ranges(const ShadeRequest& request, const std::filesystem::p
                   "a farm writes shaded points to a file of points, such as .ply");
   require_request(request.receivers.empty() && request.joined.empty() && !request.original_order,
                   "receivers", "a farm shades the points of its scene, in their order");
-  require_request(!request.error && !request.estimate && request.check.receivers == 0, "error",
-                  "a farm shades with settings that are given, without errors and checks");
+  require_request(!request.estimate && request.check.receivers == 0, "check",
+                  "a farm shades without estimates and checks");
   require_request(!request.glossy.roughness && request.shadows.empty() && !request.light_groups &&
                       !request.sky && !request.tolerate_damage &&
                       request.gather.around.diagonals == 0,
                   "glossy", "a farm shades occlusion, irradiance and the sky of the scene alone");
+}
+
+TuningReport choose_settings(const ShadeRequest& request, const std::filesystem::path& target,
+                             Progress& progress) {
+  LightingReport report;
+  Lighting lighting(request, report, progress);
+  prepare_points(request, target, lighting, progress);
+  lighting.tune([&] {
+    return pilots_of(lighting.scene(), selected_of(lighting.scene(), request.count), request.lift);
+  });
+  return report.tuning.value();
 }
 
 void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t plan,
@@ -116,9 +165,7 @@ void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t p
   LightingReport report;
   Lighting lighting(request, report, progress);
   const ContainerReader& scene = lighting.scene();
-  const Sky sky = recorded_lights(scene, request.run, target, progress).sky;
-  lighting.prepare(budget_of(request.run.memory_bytes, "shading"), sky, !lit_by_emitters(scene), 1,
-                   glm::dvec3(0), target);
+  prepare_points(request, target, lighting, progress);
   lighting.tune({});
 
   // Shade the range
@@ -128,26 +175,41 @@ void shade_range(const ShadeRequest& request, RangeNumber range, std::uint64_t p
   const Head head = head_of(plan, scene, receivers);
   file.append(std::as_bytes(std::span(head)));
   const Stage stage(report.seconds, progress, "shade", receivers.end - receivers.first, "points");
-  if (receivers.first < receivers.end) {
-    const std::vector<std::uint8_t> groups = rise_groups(scene.meta().channels);
-    PointCursor cursor(scene, groups, wanted, receivers.first);
-    const Lifting lifting(scene.header().frame, cursor.channels(), request.lift);
-    std::vector<Surfel> surfels(kReceiverBatch);
-    std::vector<Receiver> batch(kReceiverBatch);
-    std::vector<std::byte> rows;
-    for (std::uint64_t at = receivers.first; at < receivers.end;) {
-      const std::size_t count = cursor.next(
-          std::span(surfels).first(std::min<std::uint64_t>(kReceiverBatch, receivers.end - at)),
-          &rows);
-      lifting.place(std::span(surfels).first(count), rows, batch);
-      const auto bytes = std::as_bytes(lighting.shade(std::span(batch).first(count)).shading);
-      const std::uint64_t xxh3 = xxh3_64(bytes);
-      file.append(std::as_bytes(std::span(&xxh3, 1)));
-      file.append(bytes);
-      at += count;
-    }
-  }
+  shade_receivers(
+      request, receivers, rise_groups(scene.meta().channels), lighting,
+      [&](std::span<const Surfel>, std::span<const std::byte>, const LitReceivers& lit) {
+        const auto bytes = std::as_bytes(lit.shading);
+        const std::uint64_t xxh3 = xxh3_64(bytes);
+        file.append(std::as_bytes(std::span(&xxh3, 1)));
+        file.append(bytes);
+      });
   file.publish();
+}
+
+bool shade_tile(const ShadeRequest& request, RangeNumber range, const std::filesystem::path& target,
+                Progress& progress) {
+  // Open the scene and divide the memory
+  LightingReport report;
+  Lighting lighting(request, report, progress);
+  const ContainerReader& scene = lighting.scene();
+  const Receivers receivers = receivers_of(selected_of(scene, request.count), range);
+  if (receivers.first == receivers.end) return false;
+  prepare_points(request, target, lighting, progress);
+  lighting.tune({});
+
+  // Shade the range
+  const std::uint64_t count = receivers.end - receivers.first;
+  PointWriteInfo info =
+      shaded_points(scene, count, settings_text(request, request.gather, request.receiver_rays),
+                    request.colour_from, output_format(target));
+  note_changed_values(target, info, progress);
+  const std::unique_ptr<ShadedSink> sink = make_shaded_sink(target, scene, info, {});
+  const Stage stage(report.seconds, progress, "shade", count, "points");
+  shade_receivers(request, receivers, groups_without_shading(scene), lighting,
+                  [&](std::span<const Surfel> surfels, std::span<const std::byte> rows,
+                      const LitReceivers& lit) { sink->write(surfels, rows, lit, {}); });
+  sink->finish();
+  return true;
 }
 
 void shade_part(const ShadeRequest& request, std::size_t part, const std::filesystem::path& target,
@@ -173,8 +235,9 @@ void collect_shading(const ShadeRequest& request, const std::vector<std::filesys
   charge_directory(budget, scene);
   budget.require();
   const std::uint64_t wanted = selected_of(scene, request.count);
-  PointWriteInfo info = shaded_points(scene, wanted, settings_text(request, request.gather, 0),
-                                      request.colour_from, output_format(target));
+  PointWriteInfo info =
+      shaded_points(scene, wanted, settings_text(request, request.gather, request.receiver_rays),
+                    request.colour_from, output_format(target));
   note_changed_values(target, info, progress);
   const std::unique_ptr<ShadedSink> sink = make_shaded_sink(target, scene, info, {});
 
