@@ -506,6 +506,11 @@ class Farm(ProgramTest):
                 self.assertEqual([task["name"] for task in plan["tasks"][5:]],
                                  ["join"] + [f"shade.{i}" for i in range(ranges)] + ["collect"])
 
+    def test_there_is_a_range_for_each_million_points_that_are_shaded(self):
+        for count, ranges in ((["--count", "2M"], 2), ([], 20)):
+            plan = self.plan("--city", "20M", "--shade", self.here / "lit.ply", *count)
+            self.assertEqual(sum(task["kind"] == "shade" for task in plan["tasks"]), ranges)
+
     def test_shaded_clouds_keep_their_channels(self):
         cloud = self.here / "a.ply"
         write_ply(cloud, [(*point, i % 251) for i, point in enumerate(ball(900))], CHANNELS)

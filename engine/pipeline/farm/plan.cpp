@@ -313,7 +313,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
   if (plan.shading && plan.shading->ranges == 0) {
     plan.shading->ranges = static_cast<std::size_t>(
-        std::clamp<std::uint64_t>(plan.points / kRangePoints, 1, kMaxRanges));
+        std::clamp<std::uint64_t>(plan.shaded_points() / kRangePoints, 1, kMaxRanges));
   }
   require_request(count_tasks(plan) <= kMaxTasks, "bounces",
                   "the plan has more than 1,000,000 tasks: take fewer parts or bounces");

@@ -161,6 +161,8 @@ struct FarmPlan {
   [[nodiscard]] bool is_divided(std::size_t input) const;
   /// Says whether each range that is shaded gets a file of points of its own.
   [[nodiscard]] bool has_tiles() const;
+  /// Returns how many points are shaded, about. @pre shading
+  [[nodiscard]] std::uint64_t shaded_points() const;
   /// Returns how many bounces are made of all points before a range is shaded.
   [[nodiscard]] unsigned waves() const noexcept;
   /// Returns the file that a task writes.

@@ -1,5 +1,6 @@
 #include "engine/pipeline/farm/plan_tasks.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -115,14 +116,14 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
 
   // Shade the ranges, and collect their results
   const std::size_t ranges = plan.shading->ranges;
-  const std::uint64_t points = plan.points / ranges;
+  const std::uint64_t points = plan.shaded_points() / ranges;
   FarmTask collect{.step = {TaskKind::collect},
                    .after = TaskStep{TaskKind::shade},
                    .inputs = {plan.scene, plan.folder() / "shade.*"},
                    .outputs = {plan.shading->target},
                    .memory_bytes = memory_bytes,
-                   .disk_bytes = plan.points * 2 * kResultBytes,
-                   .seconds = static_cast<double>(plan.points) * kCollectSeconds};
+                   .disk_bytes = plan.shaded_points() * 2 * kResultBytes,
+                   .seconds = static_cast<double>(plan.shaded_points()) * kCollectSeconds};
   std::uint64_t result_bytes = kResultBytes;
   if (plan.has_tiles()) {  // there is nothing to collect, but the bounces go
     result_bytes = 2 * kResultBytes;
@@ -191,6 +192,11 @@ bool FarmPlan::is_divided(std::size_t input) const {
 
 bool FarmPlan::has_tiles() const {
   return shading && frame_name(shading->target, 0).has_value();
+}
+
+std::uint64_t FarmPlan::shaded_points() const {
+  const std::uint64_t wanted = shading.value().request.count;
+  return wanted == 0 ? points : std::min(wanted, points);
 }
 
 unsigned FarmPlan::waves() const noexcept {
