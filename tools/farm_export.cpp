@@ -29,15 +29,16 @@ std::string for_parallel(const FarmPlan& plan) {
 
 /// Returns the lines that submit an array.
 /// @param after  the variables of the jobs that must be done before, as Slurm takes them
-std::string lines_of(const FarmPlan& plan, const SlurmArray& array, const std::string& after) {
+std::string lines_of(const FarmPlan& plan, const SlurmArray& array, const std::string& after,
+                     unsigned cores) {
   std::string options;
-  for (const std::string& option : slurm_options(plan, array)) options += " " + option;
+  for (const std::string& option : slurm_options(plan, array, cores)) options += " " + option;
   return fmt::format("{}=$(sbatch --parsable{}{} <<'TASK'\n#!/bin/sh\n{}TASK\n)\n", array.name,
                      options, after.empty() ? "" : " --dependency=afterok" + after,
                      slurm_script(array));
 }
 
-std::string for_slurm(const FarmPlan& plan) {
+std::string for_slurm(const FarmPlan& plan, unsigned cores) {
   std::string text = fmt::format(
       "#!/bin/sh\n# Submits the tasks of {} to Slurm, and prints the numbers of their jobs.\n"
       "set -e\nmkdir -p {}\n",
@@ -46,7 +47,7 @@ std::string for_slurm(const FarmPlan& plan) {
   for (const TaskStep& step : steps_of(plan)) {
     std::string jobs;
     for (const SlurmArray& array : slurm_arrays(plan, step)) {
-      text += lines_of(plan, array, after);
+      text += lines_of(plan, array, after, cores);
       jobs += ":$" + array.name;
       all += " $" + array.name;
     }
@@ -89,12 +90,12 @@ std::string for_openjd(const FarmPlan& plan) {
 
 }  // namespace
 
-std::string exported(const FarmPlan& plan, Scheduler scheduler) {
+std::string exported(const FarmPlan& plan, Scheduler scheduler, unsigned cores) {
   switch (scheduler) {
     case Scheduler::parallel:
       return for_parallel(plan);
     case Scheduler::slurm:
-      return for_slurm(plan);
+      return for_slurm(plan, cores);
     case Scheduler::openjd:
       break;
   }

@@ -75,6 +75,8 @@ class SceneArguments {
   /// @param output    as for InputFiles, which says what is thrown
   /// @param progress  gets notes about options that the files leave without effect
   void apply(LightingRequest& request, const std::filesystem::path& output, Progress& progress);
+  /// The files of the scene, as they were given.
+  [[nodiscard]] const std::vector<std::filesystem::path>& names() const noexcept { return names_; }
 
  private:
   std::vector<std::filesystem::path> names_;

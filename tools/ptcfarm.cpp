@@ -7,12 +7,15 @@
 //   status    how far they are
 //   export    the tasks for another scheduler
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <wordexp.h>
 
+#include "engine/base/error.h"
 #include "engine/io/file/file.h"
 #include "engine/io/file/text_file.h"
 #include "engine/pipeline/budgets.h"
@@ -26,6 +29,7 @@
 #include "tools/farm_status.h"
 #include "tools/inputs.h"
 #include "tools/options.h"
+#include "tools/render_arguments.h"
 #include "tools/report.h"
 #include "tools/scene_options.h"
 #include "tools/slurm_jobs.h"
@@ -37,13 +41,13 @@ constexpr char kPurpose[] =
     "Builds one container by many tasks, on one machine or on many.\n"
     "A plan says what is built, where its points are cut into parts, and by which tasks. Each task "
     "is one command line: route sends the points of an input to the parts that they belong to, "
-    "part "
-    "sorts and builds the points of one part, join writes the scene file over all parts; light "
+    "part sorts and builds the points of one part, join writes the scene file over all parts; "
+    "light "
     "lights the points of a part by the whole scene, and join_light joins the parts again; bounce "
     "and join_bounce do so for each bounce of the light but the last; tune chooses settings that "
     "meet an error, shade computes the light at a range of the points, and collect writes the "
-    "shaded points. A task that is done does nothing "
-    "when it is run again, and what a task writes appears whole or not at all.\n"
+    "shaded points; frame renders a picture. A task that is done does nothing when it is run "
+    "again, and what a task writes appears whole or not at all.\n"
     "\n"
     "The scene refers to its parts, which stay files of their own. Its tree, and all that is "
     "shaded "
@@ -60,6 +64,9 @@ constexpr char kExamples[] =
     "  # Light its points by tasks, too, and shade them with three bounces\n"
     "  ptcfarm plan tiles/*.ptcx --sun 200,35 --sky 0.3,0.4,0.6 --shade lit.ply --bounces 3 "
     "-o town.json\n"
+    "  # Go once around it, a task for each picture\n"
+    "  ptcfarm plan town.ptcx --scene turn.ptcx --render '-o turn.##.exr --turntable 48' "
+    "-o turn.json\n"
     "  # Run one task, as a farm does\n"
     "  ptcfarm part town.json --number 3\n"
     "  # Let a cluster run them\n"
@@ -79,6 +86,7 @@ struct Arguments {
   ptc::BuildRequest request;
   ptc::FarmOptions farm;
   ptc::FarmShading shading;
+  std::string pictures;
   ptc::LightArguments lights;
   ptc::LightRequest lighting;
   std::size_t number = 0;
@@ -102,7 +110,7 @@ void declare(ptc::Command& command, Arguments& arguments) {
                           "that are done left out. submit has a cluster run them, and cancel ends "
                           "its jobs. status says how far they are. export writes them for another "
                           "scheduler. route, part, join, light, join_light, bounce, join_bounce, "
-                          "tune, shade and collect run one task.")
+                          "tune, shade, collect and frame run one task.")
       ->required()
       ->type_name("ACTION")
       ->default_str("")
@@ -155,7 +163,7 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
-                   "Number of the task among those of its kind, and of its bounce")
+                   "Number of the task among those of its kind and bounce, from 0")
       ->group(kGroup);
   ptc::add_integer(app, "--wave", arguments.wave, 0, 1000,
                    "Number of the bounce whose task it is, from 1 on")
@@ -193,6 +201,16 @@ void declare_shading(ptc::Command& command, ptc::FarmShading& shading) {
     app.get_option(name)->needs(shade);
 }
 
+void declare_pictures(CLI::App& app, std::string& pictures) {
+  app.add_option("--render", pictures,
+                 "Also render pictures of the scene, with these options of ptcrender\n"
+                 "OPTIONS is one text, quoted as a shell has it, such as \"-o turn.##.exr "
+                 "--turntable 48 --size 960x540\". Each frame is a task of its own. The scene and "
+                 "the resources are those of the plan.")
+      ->type_name("OPTIONS")
+      ->group("Pictures");
+}
+
 void declare_container(CLI::App& app, ptc::BuildRequest& request) {
   ptc::add_profile(app, request.profile)->group("Container");
   ptc::add_page_size(app, request.page_shift)->group("Container");
@@ -207,6 +225,101 @@ nlohmann::ordered_json facts_of(const ptc::FarmPlan& plan) {
           {"points", plan.points},
           {"parts", plan.parts()},
           {"tasks", plan.tasks.size()}};
+}
+
+/// Returns the words of a text as a shell has them, without running anything.
+std::vector<std::string> words_of(const std::string& text) {
+  wordexp_t found{};
+  const int error = wordexp(text.c_str(), &found, WRDE_NOCMD | WRDE_UNDEF | WRDE_SHOWERR);
+  if (error != 0) {
+    throw CLI::ValidationError("--render",
+                               fmt::format("cannot be read as words of a shell: {}", text));
+  }
+  std::vector<std::string> words(found.we_wordv, found.we_wordv + found.we_wordc);
+  wordfree(&found);
+  return words;
+}
+
+/// The options of ptcrender for some pictures.
+struct Pictures {
+  /// @throws CLI::ParseError
+  Pictures(const std::filesystem::path& scene, const std::vector<std::string>& words)
+      : command("ptcrender", "Renders pictures of a plan.", "") {
+    arguments.declare(command);
+    std::vector<std::string> all(words.rbegin(), words.rend());  // as parse() takes them
+    all.push_back(scene.string());
+    command.app().parse(all);
+  }
+  ptc::Command command;
+  ptc::RenderArguments arguments;
+};
+
+/// Refuses pictures of a plan. @param why  what is wrong
+[[noreturn]] void refuse_pictures(const std::string& why) {
+  throw CLI::ValidationError("--render", why);
+}
+
+/// Returns the pictures of a plan. @param text  options of ptcrender, as a shell has them
+ptc::FarmFrames frames_of(const std::string& text, const std::filesystem::path& scene) {
+  // Read the options as ptcrender does
+  const std::vector<std::string> words = words_of(text);
+  std::optional<Pictures> pictures;
+  try {
+    pictures.emplace(scene, words);
+  } catch (const CLI::ParseError& error) {
+    refuse_pictures(error.what());
+  }
+  const ptc::RenderArguments& arguments = pictures->arguments;
+  if (arguments.scenes() != 1 || std::ranges::find(words, "--") != words.end())
+    refuse_pictures("the pictures are of the scene of the plan: name no other one");
+
+  // Take what tasks need, and leave the frames out
+  ptc::FarmFrames frames{.directory = std::filesystem::current_path(),
+                         .seconds = arguments.expected_seconds()};
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (words[i].starts_with("--frames=")) continue;
+    if (words[i] == "--frames") {
+      ++i;
+    } else {
+      frames.options.push_back(words[i]);
+    }
+  }
+  if (arguments.sequence()) frames.range = arguments.sequence()->frames;
+  for (const std::filesystem::path& target : arguments.targets()) {
+    frames.targets.push_back(std::filesystem::absolute(target));
+    const std::string name = target.string();
+    if (!std::filesystem::is_directory(frames.targets.back().parent_path()))
+      refuse_pictures(name + ": there is no such folder");
+    if (!frames.range) continue;
+    if (!ptc::frame_name(target, 1)) {
+      refuse_pictures(name +
+                      ": the name of a sequence needs a mark for the number of the frame, such as "
+                      "####");
+    }
+    if (ptc::has_ending(target, ".png") && !arguments.has_exposure())
+      refuse_pictures(name + ": tasks cannot agree on an exposure: give --exposure, or write .exr");
+  }
+  return frames;
+}
+
+/// Renders the picture of a task.
+/// @throws DataError when the plan has options that ptcrender does not know; as render_picture()
+void render_frame(const ptc::FarmPlan& plan, const ptc::FarmTask& task, const ptc::RunOptions& run,
+                  ptc::Progress& progress) {
+  const ptc::FarmFrames& frames = plan.frames.value();
+  std::vector<std::string> words = frames.options;
+  if (frames.range) words.push_back(fmt::format("--frames={}", (*frames.range)[task.number]));
+  ptc::RunOptions own = run;
+  for (std::filesystem::path& directory : own.temp_dirs)
+    directory = std::filesystem::absolute(directory);
+  std::filesystem::current_path(frames.directory);
+  std::optional<Pictures> pictures;
+  try {
+    pictures.emplace(plan.scene, words);
+  } catch (const CLI::ParseError& error) {
+    throw ptc::DataError(fmt::format("{}: its pictures: {}", plan.file.string(), error.what()));
+  }
+  static_cast<void>(pictures->arguments.render(pictures->command, own, progress));
 }
 
 /// The command line of a task. The cap is that of the plan.
@@ -240,6 +353,7 @@ ptc::Outcome plan(Arguments& arguments, ptc::Command& command, ptc::Progress& pr
                                                      *ptc::texture_store(request.run, scene));
     arguments.farm.lighting = arguments.lighting;
   }
+  if (!arguments.pictures.empty()) arguments.farm.frames = frames_of(arguments.pictures, scene);
   for (const char* name : {"--sun-rays", "--area-rays"}) {
     if (command.app().count(name) > 0 && !arguments.farm.lighting)
       throw CLI::RequiresError(name, "a light, such as --sun");
@@ -287,15 +401,18 @@ ptc::Outcome run_one(const Arguments& arguments, ptc::Command& command, ptc::Pro
     throw CLI::ValidationError(
         "--number", fmt::format("the plan has no task {}.{}", step.name(), arguments.number));
   }
-  const bool ran = ptc::run_task(plan, *task, command.run_options(), progress);
+  const ptc::RunOptions& run = command.run_options();
+  const bool ran = ptc::run_task(plan, *task, run, progress, [&](const ptc::FarmTask& frame) {
+    render_frame(plan, frame, run, progress);
+  });
   return {{{"plan", plan.file.string()}, {"task", task->name()}, {"ran", ran}},
           fmt::format("{}: {}\n", task->name(), ran ? "done" : "was done before")};
 }
 
-ptc::Outcome submit(const Arguments& arguments) {
+ptc::Outcome submit(const Arguments& arguments, const ptc::Command& command) {
   if (!arguments.slurm) throw CLI::RequiredError("--slurm, the scheduler to submit to,");
   const ptc::FarmPlan plan = only_plan(arguments);
-  const std::vector<std::string> jobs = ptc::submit_to_slurm(plan);
+  const std::vector<std::string> jobs = ptc::submit_to_slurm(plan, command.run_options().threads);
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["jobs"] = jobs;
   outcome.summary = jobs.empty()
@@ -320,12 +437,13 @@ ptc::Outcome cancel(const Arguments& arguments) {
   return outcome;
 }
 
-ptc::Outcome export_tasks(const Arguments& arguments) {
+ptc::Outcome export_tasks(const Arguments& arguments, const ptc::Command& command) {
   if (arguments.output.empty()) throw CLI::RequiredError("--output");
   const ptc::FarmPlan plan = only_plan(arguments);
   if (ptc::same_name(arguments.output, plan.file))
     throw CLI::ValidationError("--output", "it is the plan itself");
-  ptc::write_text(arguments.output, ptc::exported(plan, arguments.scheduler));
+  ptc::write_text(arguments.output,
+                  ptc::exported(plan, arguments.scheduler, command.run_options().threads));
   ptc::Outcome outcome{.facts = facts_of(plan), .summary = {}};
   outcome.facts["output"] = arguments.output.string();
   outcome.summary = fmt::format("{}: {} tasks\n", arguments.output.string(), plan.tasks.size());
@@ -339,13 +457,13 @@ ptc::Outcome act(Arguments& arguments, ptc::Command& command, ptc::Progress& pro
     case Action::run:
       return run(arguments, command, progress);
     case Action::submit:
-      return submit(arguments);
+      return submit(arguments, command);
     case Action::cancel:
       return cancel(arguments);
     case Action::status:
       return ptc::farm_status(only_plan(arguments));
     case Action::export_tasks:
-      return export_tasks(arguments);
+      return export_tasks(arguments, command);
     case Action::task:
       break;
   }
@@ -364,6 +482,7 @@ int main(int argc, char** argv) {
   arguments.lights.declare(command.app());
   ptc::add_shadow_rays(command.app(), arguments.lighting.light_sampling);
   declare_shading(command, arguments.shading);
+  declare_pictures(command.app(), arguments.pictures);
   return command.run(argc, argv,
                      [&](ptc::Progress& progress) { return act(arguments, command, progress); });
 }

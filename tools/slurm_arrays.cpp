@@ -86,16 +86,20 @@ std::vector<SlurmArray> slurm_arrays(const FarmPlan& plan, const TaskStep& step,
   return arrays;
 }
 
-std::vector<std::string> slurm_options(const FarmPlan& plan, const SlurmArray& array) {
+std::vector<std::string> slurm_options(const FarmPlan& plan, const SlurmArray& array,
+                                       unsigned cores) {
   const std::string log = without_pattern(plan.folder() / "log" / array.name) + ".%a";
-  return {"--requeue",
-          "--kill-on-invalid-dep=yes",
-          "--job-name=" + quoted(plan.scene.stem().string() + "." + array.name),
-          "--array=" + ranges_of(array.indices),
-          fmt::format("--mem={}M", mebibytes(*array.task)),
-          fmt::format("--time={}", static_cast<int>(std::ceil(array.seconds / 6)) + 5),
-          "--open-mode=append",
-          "--output=" + quoted(log)};
+  std::vector<std::string> options{
+      "--requeue",
+      "--kill-on-invalid-dep=yes",
+      "--job-name=" + quoted(plan.scene.stem().string() + "." + array.name),
+      "--array=" + ranges_of(array.indices),
+      fmt::format("--mem={}M", mebibytes(*array.task)),
+      fmt::format("--time={}", static_cast<int>(std::ceil(array.seconds / 6)) + 5),
+      "--open-mode=append",
+      "--output=" + quoted(log)};
+  if (cores > 0) options.push_back(fmt::format("--cpus-per-task={}", cores));
+  return options;
 }
 
 std::string slurm_script(const SlurmArray& array) {

@@ -42,7 +42,9 @@ struct SlurmArray {
     const std::function<bool(const FarmTask&)>& wanted = {});
 
 /// Returns the options of sbatch for an array, as a shell or a line #SBATCH takes them.
-[[nodiscard]] std::vector<std::string> slurm_options(const FarmPlan& plan, const SlurmArray& array);
+/// @param cores  of a job; 0: as Slurm gives it, one
+[[nodiscard]] std::vector<std::string> slurm_options(const FarmPlan& plan, const SlurmArray& array,
+                                                     unsigned cores);
 
 /// Returns the script that each job of an array runs. A job is queued again as worth_retry() and
 /// kMaxRetries say, and gives up after kMaxRestarts, also when Slurm has queued it again.

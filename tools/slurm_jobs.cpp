@@ -132,10 +132,11 @@ std::set<std::string> ids_of(const std::vector<Queued>& list) {
 
 /// Submits an array. @return  its number
 std::string submit(const FarmPlan& plan, const SlurmArray& array,
-                   const std::vector<std::string>& after) {
+                   const std::vector<std::string>& after, unsigned cores) {
   // Write its script
   std::string text = "#!/bin/sh\n";
-  for (const std::string& option : slurm_options(plan, array)) text += "#SBATCH " + option + "\n";
+  for (const std::string& option : slurm_options(plan, array, cores))
+    text += "#SBATCH " + option + "\n";
   const std::filesystem::path script = slurm_folder(plan) / (array.name + ".sh");
   write_text(script, text + slurm_script(array));
 
@@ -158,7 +159,7 @@ std::filesystem::path slurm_folder(const FarmPlan& plan) {
   return std::filesystem::path(plan.file).replace_extension(".slurm");
 }
 
-std::vector<std::string> submit_to_slurm(const FarmPlan& plan) {
+std::vector<std::string> submit_to_slurm(const FarmPlan& plan, unsigned cores) {
   // See that no jobs of the plan are under way
   std::filesystem::create_directories(slurm_folder(plan));
   std::filesystem::create_directories(plan.folder() / "log");
@@ -177,7 +178,7 @@ std::vector<std::string> submit_to_slurm(const FarmPlan& plan) {
     for (const TaskStep& step : steps_of(plan)) {
       std::vector<std::string> ids;
       for (const SlurmArray& array : slurm_arrays(plan, step, undone)) {
-        ids.push_back(submit(plan, array, after));
+        ids.push_back(submit(plan, array, after, cores));
         jobs.push_back({ids.back(), array.name});
         write_jobs(plan, jobs);
       }

@@ -36,7 +36,7 @@ struct SlurmQueue {
 /// @return  the numbers of the jobs; none when all tasks are done
 /// @throws DataError when jobs of the plan are in the queue; std::system_error with what sbatch
 ///         said when it fails, with the jobs before it cancelled
-std::vector<std::string> submit_to_slurm(const FarmPlan& plan);
+std::vector<std::string> submit_to_slurm(const FarmPlan& plan, unsigned cores);
 
 /// Asks Slurm for the jobs of a plan. @return  nothing when none were submitted
 [[nodiscard]] std::optional<SlurmQueue> slurm_queue(const FarmPlan& plan);

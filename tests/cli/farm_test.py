@@ -31,6 +31,7 @@ CHANNELS = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g
 # As a plan has a channel, without components
 CHANNEL = {"name": "a", "type": 1, "components": 0, "group": 2, "role": 0, "colour_space": 0, "unit": "", "scale": 1, "offset": 0,
            "size": 0}
+FRAMES = {"options": [], "directory": "/", "targets": ["/a.exr"]}
 
 
 class Farm(ProgramTest):
@@ -242,6 +243,9 @@ class Farm(ProgramTest):
         for call in calls:
             self.assertRegex(call, r"--requeue .*--mem=3\d\dM --time=\d+ ")
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
+        self.assertNotIn("--cpus-per-task", script.read_text())
+        self.succeed("ptcfarm", "export", self.here / "farm.json", "--for", "slurm", "--threads", 4, "-o", self.here / "four.sh")
+        self.assertEqual((self.here / "four.sh").read_text().count("--cpus-per-task=4"), 3)
 
     def test_slurm_does_not_take_a_name_as_a_pattern(self):
         self.succeed("ptcfarm", "plan", "--city", "8k", "-o", self.here / "50%j.json")
@@ -325,6 +329,12 @@ class Farm(ProgramTest):
                              (lambda p: p["request"].update(levels_per_stream=99), "levels in a stream"),
                              (lambda p: p["request"].update(every=0), "every 0 points"),
                              (lambda p: p["frame"].update(edge=0), "no edge"),
+                             (lambda p: p.update(frames=FRAMES | {"targets": ["a.exr"]}), "no absolute path"),
+                             (lambda p: p.update(frames=FRAMES | {"targets": []}), "no pictures"),
+                             (lambda p: p.update(frames=FRAMES | {"targets": ["/a.#.exr"], "range": [-2**63, 9, 1]}), "out of range"),
+                             (lambda p: p.update(frames=FRAMES | {"targets": ["/a.#.exr"], "range": [1, 9, 0]}), "out of range"),
+                             (lambda p: p.update(frames=FRAMES | {"range": [1, 9, 1]}), "no mark for the number"),
+                             (lambda p: p.update(frames=FRAMES), "and a join"),
                              (lambda p: p["inputs"][0].update(first=5), "does not follow the one before"),
                              (lambda p: p["tasks"][0].update(seconds=-1), "seconds"),
                              (lambda p: p.update(scene="farm.ptcx"), "no absolute path")):
@@ -640,6 +650,11 @@ class Farm(ProgramTest):
         self.assertTrue(b"".join(body(self.here / "lit" / name) for name in names) == body(one))
         folder = self.here / "farm.parts"
         self.assertEqual([path.name for path in folder.iterdir() if path.name.startswith(("bounce", "shade"))], [])
+        # A range without points has no file, also where an earlier plan has left one
+        (self.here / "lit" / "x.000.ply").write_bytes(b"old")
+        (folder / "done" / "shade.0").unlink()
+        self.run_plan()
+        self.assertFalse((self.here / "lit" / "x.000.ply").exists())
         # A lost file is shaded anew; without the bounces, these come back first
         lost = self.here / "lit" / names[0]
         before = lost.read_bytes()
@@ -709,6 +724,47 @@ class Farm(ProgramTest):
             message = self.fail_with(1, "ptcfarm", "run", path)
             self.assertIn(str(path), message)
             self.assertIn(said.replace("solid_angle", "solid"), message)
+
+    def test_pictures_are_rendered_frame_by_frame(self):
+        options = "--size 32x24 --samples 1 --bounces 0 --turntable 3"
+        plan = ["ptcfarm", "plan", self.cloud, "--parts", 2, "-o", "farm.json", "--render"]
+        (self.here / "a b").mkdir()
+        self.succeed(*plan, f"-o 'a b'/c.##.exr --frames 2-3 {options} --layer occlusion=o.##.png --exposure 0", cwd=self.here)
+        tasks = json.loads((self.here / "farm.json").read_text())["tasks"]
+        self.assertEqual([task["name"] for task in tasks[-3:]], ["join", "frame.0", "frame.1"])
+        self.run_plan()
+        for frame in (2, 3):
+            files = [self.here / "a b" / f"c.{frame:02}.exr", self.here / f"o.{frame:02}.png"]
+            self.assertEqual(sorted(tasks[frame - 4]["outputs"]), sorted(map(str, files)))
+            self.succeed("ptcrender", self.here / "farm.ptcx", "-o", self.here / "one.#.exr", *options.split(), "--frames", frame)
+            self.assertTrue(files[0].read_bytes() == (self.here / f"one.{frame}.exr").read_bytes())
+        self.assertEqual(len(list((self.here / "a b").iterdir())), 2)
+        for lost in files:
+            lost.unlink()
+            self.assertEqual(self.run_plan()["ran"], 1)
+            self.assertTrue(lost.exists())
+        # One picture; and one that fails says why
+        self.succeed(*plan, "-o one.png --size 32x24", cwd=self.here)
+        self.assertEqual(self.run_plan()["ran"], 5)
+        self.succeed(*plan, "-o 'a b/one.png' --size 32x24", cwd=self.here)
+        shutil.rmtree(self.here / "a b")
+        failed = run("ptcfarm", "run", self.here / "farm.json")
+        self.assertEqual(failed.returncode, 3)
+        self.assertRegex(failed.stderr, "frame.0 failed:\nptcfarm: open a b/.*one.png.*: No such file")
+        status = self.succeed("ptcfarm", "status", self.here / "farm.json").stdout
+        self.assertIn("No such file", status)
+        for words, said in (("-o a.##.exr --frob", "--frob"), ("-o a.exr --turntable 3", "mark for the number"), ("--size 3x4", "--output"),
+                            ("-o a.##.png --turntable 3", "give --exposure"), ("-o a.exr --memory 1G", "--memory"),
+                            ("-o gone/a.exr", "no such folder"), (f"{self.scene} -o a.exr", "name no other one"), ("-o a.exr --", "name no other one"),
+                            ("-o 'a.exr", "words of a shell"), ("-o a.exr; true", "words of a shell"), ("-o $(true).exr", "words of a shell"),
+                            ("-o a.#.exr --frames 1-9x0", "frames"), ("-o a.#.exr --frames 2-1", "frames"), ("--help", "--render")):
+            with self.subTest(words):
+                self.assertIn(said, self.fail_with(2, *plan, words, cwd=self.here))
+        path = self.here / "farm.json"
+        changed = json.loads(path.read_text())
+        changed["frames"]["options"].append("--help")
+        path.write_text(json.dumps(changed))
+        self.assertEqual(run("ptcfarm", "run", path).returncode, 1)
 
     def test_a_cap_below_that_of_a_task_is_refused(self):
         self.plan("--city", "30k")

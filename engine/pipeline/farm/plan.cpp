@@ -31,8 +31,9 @@ namespace {
 
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
-constexpr std::uint64_t kRangePoints = 1'000'000;   // that a task shades
-constexpr double kMaxSeconds = 1e9;                 // of a task
+constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
+constexpr double kMaxSeconds = 1e9;                // of a task
+constexpr std::int64_t kMaxFrame = 1'000'000'000;
 constexpr std::uint64_t kMaxShares = 10'000;        // of a file
 constexpr std::uint32_t kMaxShadowRays = 1U << 16;  // of a point to lights of one kind
 
@@ -116,12 +117,31 @@ void check_lighting(const LightRequest& lighting) {
                   "gather", "a farm lights with the usual settings of the gather");
 }
 
+/// Checks the pictures of a plan.
+void check_frames(const FarmPlan& plan) {
+  const FarmFrames& frames = *plan.frames;
+  for (const std::filesystem::path& target : frames.targets) {
+    require(plan, target.is_absolute() && !has_control_characters(target),
+            "a picture is no absolute path without control characters");
+    require(plan, !frames.range || frame_name(target, 1).has_value(),
+            "the name of a picture has no mark for the number of a frame");
+  }
+  require(plan, !frames.targets.empty() && frames.directory.is_absolute(), "it has no pictures");
+  if (!frames.range) return;
+  require(plan,
+          frames.range->step > 0 && frames.range->first <= frames.range->last &&
+              frames.range->first >= -kMaxFrame && frames.range->last <= kMaxFrame &&
+              frames.range->count() <= kMaxTasks,
+          "the frames are out of range");
+}
+
 /// Returns the number of tasks that a plan implies.
 std::size_t count_tasks(const FarmPlan& plan) {
   const std::size_t tune = plan.shading && plan.shading->request.error ? 1 : 0;
   const std::size_t shading = plan.shading ? tune + plan.shading->ranges + 1 : 0;
   const std::size_t builds = 1 + (plan.lighting ? 1 : 0) + plan.waves();
-  return plan.inputs.size() + builds * (plan.parts() + 1) + shading;
+  const std::size_t frames = plan.frames ? plan.frames->count() : 0;
+  return plan.inputs.size() + builds * (plan.parts() + 1) + shading + frames;
 }
 
 /// Checks what a plan says, but for its tasks.
@@ -155,6 +175,7 @@ void check_plan(const FarmPlan& plan) {
           std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
           "the cuts do not ascend");
   if (plan.lighting) check_lighting(*plan.lighting);
+  if (plan.frames) check_frames(plan);
   if (!plan.shading) return;
   require(plan, plan.shading->target.is_absolute() && !has_control_characters(plan.shading->target),
           "the shaded points are no absolute path without control characters");
@@ -256,7 +277,8 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                 .scene = std::filesystem::absolute(scene),
                 .request = request,
                 .lighting = options.lighting,
-                .shading = options.shading};
+                .shading = options.shading,
+                .frames = options.frames};
   if (plan.lighting) check_lighting(*plan.lighting);
   if (plan.shading) {
     plan.shading->target = std::filesystem::absolute(plan.shading->target);
@@ -265,6 +287,10 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   for (const std::filesystem::path& input : request.inputs) {
     if (is_url(input))
       throw DataError(input.string() + ": a plan takes files that all machines see, and no URL");
+  }
+  if (plan.frames && plan.frames->range) {
+    SequenceRequest sequence{.frames = *plan.frames->range};
+    check_sequence(sequence);
   }
   check_plan_paths(request, plan);
   for (const std::filesystem::path& input : request.inputs) {
@@ -316,7 +342,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
         std::clamp<std::uint64_t>(plan.shaded_points() / kRangePoints, 1, kMaxRanges));
   }
   require_request(count_tasks(plan) <= kMaxTasks, "bounces",
-                  "the plan has more than 1,000,000 tasks: take fewer parts or bounces");
+                  "the plan has more than 1,000,000 tasks: take fewer parts, bounces or frames");
   require_task_memory(plan, options.memory_bytes);
   add_tasks(plan, options.memory_bytes);
   for (const auto& [path, states] : plan.files) require_unchanged(states);

@@ -8,6 +8,7 @@
 //   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
 //   collect          the light of all ranges --> shaded points          shaded.ply
 //                    (where ranges have files of their own: nothing)
+//   frame.0 ...      the scene --> a picture                            turn.0001.exr
 //
 // A scene that is lit is built under another name first, and so is one for each bounce but the
 // last:
@@ -38,6 +39,7 @@
 #include "engine/pipeline/farm/input_state.h"
 #include "engine/pipeline/farm/range_file.h"
 #include "engine/pipeline/light/light_container.h"
+#include "engine/pipeline/render/shots.h"
 #include "engine/pipeline/shade/shade_container.h"
 #include "engine/scene/procedural/city.h"
 #include "format/morton.h"
@@ -56,13 +58,15 @@ enum class TaskKind {
   join_bounce,
   tune,
   shade,
-  collect
+  collect,
+  frame
 };
 
 /// All kinds.
 inline constexpr std::array kTaskKinds{
-    TaskKind::route,  TaskKind::part,        TaskKind::join, TaskKind::light, TaskKind::join_light,
-    TaskKind::bounce, TaskKind::join_bounce, TaskKind::tune, TaskKind::shade, TaskKind::collect};
+    TaskKind::route,      TaskKind::part,    TaskKind::join,        TaskKind::light,
+    TaskKind::join_light, TaskKind::bounce,  TaskKind::join_bounce, TaskKind::tune,
+    TaskKind::shade,      TaskKind::collect, TaskKind::frame};
 
 /// Returns the name of a kind, "route".
 [[nodiscard]] const char* name_of(TaskKind kind) noexcept;
@@ -80,14 +84,14 @@ struct TaskStep {
 /// One task of a plan.
 struct FarmTask {
   TaskStep step;
-  std::size_t number = 0;                     ///< among the tasks of its step
-  std::vector<std::string> command;           ///< from the program on
-  std::optional<TaskStep> after;              ///< all its tasks must be done before
-  std::vector<std::filesystem::path> inputs;  ///< "route.*" stands for the files of all routes
-  std::vector<std::filesystem::path> outputs;
-  std::uint64_t memory_bytes = 0;  ///< the cap that it is given
-  std::uint64_t disk_bytes = 0;    ///< of its outputs, about
-  double seconds = 0;              ///< expected, on one core
+  std::size_t number = 0;                      ///< among the tasks of its step
+  std::vector<std::string> command;            ///< from the program on
+  std::optional<TaskStep> after;               ///< all its tasks must be done before
+  std::vector<std::filesystem::path> inputs;   ///< "route.*" stands for the files of all routes
+  std::vector<std::filesystem::path> outputs;  ///< at least one
+  std::uint64_t memory_bytes = 0;              ///< the cap that it is given
+  std::uint64_t disk_bytes = 0;                ///< of its outputs, about
+  double seconds = 0;                          ///< expected, on one core
 
   /// Returns its name in the plan, "part.3".
   [[nodiscard]] std::string name() const;
@@ -117,6 +121,20 @@ struct FarmShading {
   std::size_t ranges = 0;  ///< 0: one for each million points
 };
 
+/// Pictures of the scene, when there are: one, or the frames of a sequence. They are rendered by a
+/// program, whose options this library does not know.
+struct FarmFrames {
+  std::vector<std::string> options;  ///< without scene, frames and resources
+  std::filesystem::path directory;   ///< in which it runs
+  /// Files of a picture, at least one; of a sequence as for frame_name().
+  std::vector<std::filesystem::path> targets;
+  std::optional<FrameRange> range;  ///< empty: one picture
+  double seconds = 120;  ///< expected for a picture, on one core; a plan keeps it by task
+
+  /// Returns the number of pictures.
+  [[nodiscard]] std::size_t count() const noexcept { return range ? range->count() : 1; }
+};
+
 struct FarmPlan;
 
 /// Returns the command line of a task.
@@ -131,6 +149,7 @@ struct FarmOptions {
   std::uint64_t share_points = 4'000'000;  ///< that a task routes, of a container or the city
   std::optional<LightRequest> lighting;    ///< as of FarmPlan
   std::optional<FarmShading> shading;
+  std::optional<FarmFrames> frames;
 };
 
 /// A plan, as its file says it.
@@ -151,6 +170,7 @@ struct FarmPlan {
   /// of the plan. A plan that was read has no picture of the sky, but its path.
   std::optional<LightRequest> lighting;
   std::optional<FarmShading> shading;  ///< with the number of ranges
+  std::optional<FarmFrames> frames;
   std::vector<FarmTask> tasks;
 
   /// Returns the number of parts.
@@ -165,7 +185,9 @@ struct FarmPlan {
   [[nodiscard]] std::uint64_t shaded_points() const;
   /// Returns how many bounces are made of all points before a range is shaded.
   [[nodiscard]] unsigned waves() const noexcept;
-  /// Returns the file that a task writes.
+  /// Returns the files of a picture. @pre frames
+  [[nodiscard]] std::vector<std::filesystem::path> pictures(std::size_t number) const;
+  /// Returns the first file that a task writes.
   [[nodiscard]] std::filesystem::path output(const TaskStep& step, std::size_t number) const;
   /// Returns the channels as the inputs have them.
   /// @throws DataError when they do not give the channels of the record

@@ -198,6 +198,27 @@ FarmShading shading_of(const OrderedJson& json) {
   return shading;
 }
 
+OrderedJson to_json(const FarmFrames& frames) {
+  OrderedJson json{{"options", frames.options},
+                   {"directory", frames.directory.string()},
+                   {"targets", to_json(frames.targets)}};
+  if (frames.range) json["range"] = {frames.range->first, frames.range->last, frames.range->step};
+  return json;
+}
+
+FarmFrames frames_of(const OrderedJson& json) {
+  FarmFrames frames{.options = json.at("options").get<std::vector<std::string>>(),
+                    .directory = json.at("directory").get<std::string>(),
+                    .targets = {}};
+  for (const OrderedJson& target : json.at("targets"))
+    frames.targets.emplace_back(target.get<std::string>());
+  if (json.contains("range")) {
+    const auto range = json.at("range").get<std::array<std::int64_t, 3>>();
+    frames.range = {range[0], range[1], range[2]};
+  }
+  return frames;
+}
+
 OrderedJson to_json(const FarmTask& task) {
   return {{"name", task.name()},
           {"kind", name_of(task.step.kind)},
@@ -259,6 +280,7 @@ FarmPlan plan_of(const OrderedJson& json) {
                json.at("texts").get<std::map<std::string, std::string>>()};
   for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
   if (json.contains("lighting")) plan.lighting = lighting_of(json.at("lighting"));
+  if (json.contains("frames")) plan.frames = frames_of(json.at("frames"));
   if (json.contains("shading")) plan.shading = shading_of(json.at("shading"));
   for (const OrderedJson& task : json.at("tasks")) plan.tasks.push_back(task_of(task));
   return plan;
@@ -294,6 +316,7 @@ std::string plan_to_json(const FarmPlan& plan) {
                    {"cuts", cuts},
                    {"tasks", tasks}};
   if (plan.lighting) json["lighting"] = to_json(*plan.lighting);
+  if (plan.frames) json["frames"] = to_json(*plan.frames);
   if (plan.shading) json["shading"] = to_json(*plan.shading);
   return json.dump(1) + "\n";
 }

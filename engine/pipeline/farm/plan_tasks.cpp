@@ -7,17 +7,17 @@
 
 #include <fmt/format.h>
 
-#include "engine/pipeline/render/shots.h"
-
 namespace ptc {
 namespace {
 
 // Seconds of one core for a point, and bytes of a point in a container: those of a city of 20
 // million points, doubled for slower machines and for channels.
 constexpr double kRouteSeconds = 2.2e-7, kPartSeconds = 7e-7;
-constexpr double kLightSeconds = 1.8e-4, kBounceSeconds = 1e-4;
+constexpr double kShadowRaySeconds = 1e-6, kSkySeconds = 1.8e-4, kBounceSeconds = 1e-4;
+constexpr double kReadSeconds = 1e-7;  // of a point that may emit
 constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;
 constexpr double kTuneSeconds = 300;  // of the task: its pilots are as many for any scene
+constexpr std::uint64_t kFrameBytes = 10'000'000;
 constexpr std::uint64_t kStoredBytes = 26, kResultBytes = 40;
 
 /// Returns the files of all parts that a step writes: "unlit.*.ptcx".
@@ -70,6 +70,19 @@ void add_parts(FarmPlan& plan, const TaskStep& step, const TaskStep& join, const
                         .seconds = 0.01 * static_cast<double>(plan.parts())});
 }
 
+/// Returns what it takes to light a point, seconds of one core.
+double light_seconds(const FarmPlan& plan) {
+  const LightRig& rig = plan.lighting.value().lights.value();
+  const LightSampling& sampling = plan.lighting->light_sampling;
+  const auto rays = static_cast<double>(rig.suns.size() * sampling.sun_rays + rig.points.size() +
+                                        rig.spots.size() + (plan.emits ? sampling.area_rays : 0));
+  double seconds = (1 + rays) * kShadowRaySeconds;
+  if (rig.sky.radiance != glm::vec3(0)) seconds += kSkySeconds;
+  // Each task reads all points twice to find those that emit
+  if (plan.emits) seconds += 2 * static_cast<double>(plan.parts()) * kReadSeconds;
+  return seconds;
+}
+
 /// Adds the tasks that light the points, and those that add bounces to their light.
 /// @return  after which tasks they can be shaded
 TaskStep add_light(FarmPlan& plan, std::uint64_t memory_bytes) {
@@ -77,10 +90,10 @@ TaskStep add_light(FarmPlan& plan, std::uint64_t memory_bytes) {
   if (plan.lighting) {
     std::vector<std::filesystem::path> inputs;
     add_scene(plan, {TaskKind::part}, last, inputs);
-    const std::string& picture = plan.lighting->lights.value().sky.map_path;
-    if (!picture.empty()) inputs.emplace_back(picture);
+    const Sky& sky = plan.lighting->lights.value().sky;
+    if (!sky.map_path.empty()) inputs.emplace_back(sky.map_path);
     add_parts(plan, {TaskKind::light}, {TaskKind::join_light}, last, inputs, memory_bytes,
-              kLightSeconds);
+              light_seconds(plan));
     last = {TaskKind::join_light};
   }
   for (unsigned wave = 1; wave <= plan.waves(); ++wave) {
@@ -143,6 +156,23 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
   plan.tasks.push_back(std::move(collect));
 }
 
+/// Adds the tasks that render pictures, behind all others.
+void add_frames(FarmPlan& plan, std::uint64_t memory_bytes) {
+  std::vector<std::filesystem::path> inputs;
+  add_final_scene(plan, inputs);
+  const TaskStep after = plan.tasks.back().step;
+  for (std::size_t i = 0; i < plan.frames->count(); ++i) {
+    plan.tasks.push_back({.step = {TaskKind::frame},
+                          .number = i,
+                          .after = after,
+                          .inputs = inputs,
+                          .outputs = plan.pictures(i),
+                          .memory_bytes = memory_bytes,
+                          .disk_bytes = kFrameBytes,
+                          .seconds = plan.frames->seconds});
+  }
+}
+
 }  // namespace
 
 const char* name_of(TaskKind kind) noexcept {
@@ -166,9 +196,11 @@ const char* name_of(TaskKind kind) noexcept {
     case TaskKind::shade:
       return "shade";
     case TaskKind::collect:
+      return "collect";
+    case TaskKind::frame:
       break;
   }
-  return "collect";
+  return "frame";
 }
 
 std::string TaskStep::name() const {
@@ -188,6 +220,15 @@ std::filesystem::path FarmPlan::folder() const {
 
 bool FarmPlan::is_divided(std::size_t input) const {
   return inputs[input].first > 0 || (input + 1 < inputs.size() && inputs[input + 1].first > 0);
+}
+
+std::vector<std::filesystem::path> FarmPlan::pictures(std::size_t number) const {
+  const FarmFrames& all = frames.value();
+  std::vector<std::filesystem::path> named = all.targets;
+  for (std::filesystem::path& target : named) {
+    if (all.range) target = frame_name(target, (*all.range)[number]).value_or(target);
+  }
+  return named;
 }
 
 bool FarmPlan::has_tiles() const {
@@ -222,6 +263,8 @@ std::filesystem::path FarmPlan::output(const TaskStep& step, std::size_t number)
       return folder() / "tune";
     case TaskKind::collect:
       return shading.value().target;
+    case TaskKind::frame:
+      return pictures(number).front();
     case TaskKind::join:
       if (lighting) return folder() / "unlit.ptcx";
       break;
@@ -249,6 +292,7 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
             {plan.folder() / "route.*"}, memory_bytes, kPartSeconds);
   const TaskStep lit = add_light(plan, memory_bytes);
   if (plan.shading) add_shading(plan, lit, memory_bytes);
+  if (plan.frames) add_frames(plan, memory_bytes);
 }
 
 }  // namespace ptc

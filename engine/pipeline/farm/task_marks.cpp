@@ -88,7 +88,10 @@ bool TaskMarks::is_done(const FarmTask& task) {
   if (!has_output) return false;
   // A range that is shaded again needs bounces, which this task removes again
   if (task.step.kind == TaskKind::collect && plan_.has_tiles()) return all_done(TaskKind::shade);
-  return !*has_output || std::filesystem::exists(task.outputs.at(0)) || is_spent(task);
+  const auto exists = [](const std::filesystem::path& path) {
+    return std::filesystem::exists(path);
+  };
+  return !*has_output || std::ranges::all_of(task.outputs, exists) || is_spent(task);
 }
 
 bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed) {
@@ -114,6 +117,7 @@ std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task) {
     case TaskKind::light:
     case TaskKind::join_light:
     case TaskKind::collect:
+    case TaskKind::frame:
       break;
   }
   return std::nullopt;

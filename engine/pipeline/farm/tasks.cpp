@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -179,7 +180,11 @@ bool shade(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Pr
   if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
   const RangeNumber range{task.number, plan.shading->ranges};
   const std::filesystem::path& target = task.outputs.at(0);
-  if (plan.has_tiles()) return shade_tile(request, range, target, progress);
+  if (plan.has_tiles()) {
+    if (shade_tile(request, range, target, progress)) return true;
+    std::filesystem::remove(target);  // of an earlier plan
+    return false;
+  }
   shade_range(request, range, plan.id, target, progress);
   return true;
 }
@@ -193,8 +198,8 @@ void collect(const FarmPlan& plan, const RunOptions& run, Progress& progress) {
 }
 
 /// Does a task. @return  whether it has written its output
-bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
-             Progress& progress) {
+bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress,
+             const RenderFrame& frame) {
   std::filesystem::create_directories(plan.folder());
   switch (task.step.kind) {
     case TaskKind::route:
@@ -219,6 +224,10 @@ bool perform(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     case TaskKind::collect:
       if (!plan.has_tiles()) collect(plan, run, progress);
       return !plan.has_tiles();
+    case TaskKind::frame:
+      if (!frame) throw std::invalid_argument("run_task: nothing renders the picture");
+      frame(task);
+      break;
   }
   return true;
 }
@@ -232,8 +241,8 @@ void require_forerunners(const FarmPlan& plan, const FarmTask& task, TaskMarks& 
 
 }  // namespace
 
-bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
-              Progress& progress) {
+bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress,
+              const RenderFrame& frame) {
   bool performed = false;
   try {
     TaskMarks marks(plan);
@@ -241,7 +250,7 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
     require_forerunners(plan, task, marks);
     forget_failure(plan, task);
     forget_other_plans(plan, task);
-    const bool has_output = perform(plan, task, run, progress);
+    const bool has_output = perform(plan, task, run, progress, frame);
     performed = true;
     mark_done(plan, task, has_output);
   } catch (const NotYet&) {
