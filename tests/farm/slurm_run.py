@@ -139,7 +139,7 @@ if __name__ == "__main__":
     parser.add_argument("bin", type=Path)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--points", default="200M")
-    parser.add_argument("--count", default="2M")
+    parser.add_argument("--count", default="400k")
     parser.add_argument("--error", default="5%")
     parser.add_argument("--output", type=Path, required=True)
     arguments = parser.parse_args()
