@@ -528,12 +528,12 @@ class Farm(ProgramTest):
 
     def test_every_bounce_is_a_wave_of_tasks_with_the_bits_of_one_machine(self):
         """Parts of the points are lit in batches of 65,536, which go across the ends of the parts."""
-        self.check_shaded(["--city", "150k"], ["--ranges", 2, "--bounces", 3, *self.COARSE])
+        self.check_shaded(["--city", "80k"], ["--ranges", 2, "--bounces", 3, *self.COARSE])
         done = {path.name for path in (self.here / "farm.parts" / "done").iterdir()}
         self.assertLess({"bounce_1.3", "join_bounce_1", "bounce_2.0", "join_bounce_2", "shade.1"}, done)
 
     def test_the_settings_that_meet_an_error_are_chosen_by_a_task(self):
-        self.check_shaded(["--city", "150k"], ["--ranges", 3, "--count", "140k", "--bounces", 2, "--error", "20%"])
+        self.check_shaded(["--city", "80k"], ["--ranges", 2, "--count", "70k", "--bounces", 2, "--error", "20%"])
         for action in ("run", "status"):
             tuning = json.loads(self.succeed("ptcfarm", action, self.here / "farm.json", "--json").stdout)["tuning"]
             self.assertTrue(tuning["met"])
@@ -576,7 +576,7 @@ class Farm(ProgramTest):
         for cloud, lights, options in (([plain], ["--sun", "200,35", "--sky", "0.3,0.4,0.6"], ["--profile", "exact"]),
                                        ([emitting], ["--point", "0,3,0,60W", "--light-group", "lamp", "--spot", "2,2,0,-1,-1,0,40,0.2,300cd"], []),
                                        ([emitting], ["--sky", "0,0,0", "--area-rays", 4], ["--original-order"]),
-                                       (["--city", "150k"], ["--sun", "200,35"], [])):
+                                       (["--city", "80k"], ["--sun", "200,35"], [])):
             with self.subTest(lights=lights):
                 self.check_lit(cloud, lights, *options)
 
