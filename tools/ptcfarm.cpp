@@ -163,7 +163,7 @@ void declare_tasks(CLI::App& app, Arguments& arguments) {
                "Scripts and numbers of jobs go into a folder beside the plan, NAME.slurm.")
       ->group(kGroup);
   ptc::add_integer(app, "--number", arguments.number, 0, 1'000'000,
-                   "Number of the task among those of its kind and bounce, from 0")
+                   "Number of the task among those of its kind, from 0")
       ->group(kGroup);
   ptc::add_integer(app, "--wave", arguments.wave, 0, 1000,
                    "Number of the bounce whose task it is, from 1 on")
