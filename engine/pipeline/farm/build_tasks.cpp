@@ -182,8 +182,7 @@ class Part {
     open_routes();
     const std::uint64_t points = count();
     if (points == 0) {  // a scene has no part without points
-      std::filesystem::remove(target_);
-      std::filesystem::remove(edges_path(target_));
+      remove_part(target_);
       return false;
     }
     progress_.begin("sort", points, "points");

@@ -31,9 +31,8 @@ namespace {
 
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
-constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
-constexpr double kMaxSeconds = 1e9;                // of a task
-constexpr std::int64_t kMaxFrame = 1'000'000'000;
+constexpr std::uint64_t kRangePoints = 1'000'000;   // that a task shades
+constexpr double kMaxSeconds = 1e9;                 // of a task
 constexpr std::uint64_t kMaxShares = 10'000;        // of a file
 constexpr std::uint32_t kMaxShadowRays = 1U << 16;  // of a point to lights of one kind
 
@@ -108,13 +107,10 @@ void check_lighting(const LightRequest& lighting) {
   check_rays(lighting.light_sampling.sun_rays, "light_sampling.sun_rays");
   check_rays(lighting.light_sampling.area_rays, "light_sampling.area_rays");
   const LightRequest usual;
-  require_request(lighting.gather.sides == usual.gather.sides && lighting.emission &&
-                      lighting.gather.solid_angle == usual.gather.solid_angle &&
-                      lighting.gather.parallax == usual.gather.parallax &&
-                      lighting.gather.inflation == usual.gather.inflation &&
-                      lighting.gather.resolution == usual.gather.resolution &&
-                      lighting.gather.around.is_plain() && lighting.lift == usual.lift,
-                  "gather", "a farm lights with the usual settings of the gather");
+  require_request(
+      has_usual_settings(lighting.gather) && lighting.gather.sides == usual.gather.sides &&
+          lighting.gather.around.is_plain() && lighting.lift == usual.lift && lighting.emission,
+      "gather", "a farm lights with the usual settings of the gather");
 }
 
 /// Checks the pictures of a plan.
@@ -128,11 +124,11 @@ void check_frames(const FarmPlan& plan) {
   }
   require(plan, !frames.targets.empty() && frames.directory.is_absolute(), "it has no pictures");
   if (!frames.range) return;
-  require(plan,
-          frames.range->step > 0 && frames.range->first <= frames.range->last &&
-              frames.range->first >= -kMaxFrame && frames.range->last <= kMaxFrame &&
-              frames.range->count() <= kMaxTasks,
-          "the frames are out of range");
+  try {
+    check_sequence({.frames = *frames.range});
+  } catch (const RequestError&) {
+    require(plan, false, "the frames are out of range");
+  }
 }
 
 /// Returns the number of tasks that a plan implies.
@@ -288,10 +284,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
     if (is_url(input))
       throw DataError(input.string() + ": a plan takes files that all machines see, and no URL");
   }
-  if (plan.frames && plan.frames->range) {
-    SequenceRequest sequence{.frames = *plan.frames->range};
-    check_sequence(sequence);
-  }
+  if (plan.frames && plan.frames->range) check_sequence({.frames = *plan.frames->range});
   check_plan_paths(request, plan);
   for (const std::filesystem::path& input : request.inputs) {
     const std::filesystem::path path = std::filesystem::absolute(input);

@@ -26,27 +26,15 @@
 namespace ptc {
 namespace {
 
-/// Removes a part and its edges, as far as they are there.
-void remove_part(const std::filesystem::path& path) {
-  std::error_code gone;
-  std::filesystem::remove(path, gone);
-  std::filesystem::remove(edges_path(path), gone);
-}
-
 /// Removes what a task wrote, when its last users are done. A second process of a user may still
 /// need it: its task ends well for all that (run_task()).
 void remove_output(const FarmTask& task) {
+  if (task.step.kind == TaskKind::tune) return;  // it says which error the points have
   std::error_code gone;
   const std::filesystem::path& output = task.outputs.at(0);
-  switch (task.step.kind) {
-    case TaskKind::part:
-    case TaskKind::bounce:
-      return remove_part(output);
-    case TaskKind::tune:
-      return;  // it says which error the points have
-    default:
-      std::filesystem::remove(output, gone);
-  }
+  std::filesystem::remove(output, gone);
+  if (task.step.kind == TaskKind::part || task.step.kind == TaskKind::bounce)
+    std::filesystem::remove(edges_path(output), gone);
 }
 
 /// Says whether what others wrote may be spent by a task: it joins or collects, or it makes a part
@@ -129,34 +117,37 @@ bool light(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Pr
   return true;
 }
 
-ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
+/// Returns the request for so many bounces, of which tasks have made all but the last.
+ShadeRequest shading_of(const FarmPlan& plan, unsigned bounces, const RunOptions& run) {
   ShadeRequest request = plan.shading.value().request;
   request.scene = plan.scene;
   request.run = run;
+  request.bounces = bounces;
+  if (bounces > 1) request.bounced = plan.output({TaskKind::join_bounce, bounces - 1}, 0);
   return request;
+}
+
+/// Returns the request for all bounces of a plan.
+ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
+  return shading_of(plan, plan.shading.value().request.bounces, run);
 }
 
 /// Adds a bounce to the light of a part. @return  whether it has points
 bool bounce(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
-  ShadeRequest request = shading_of(plan, run);
+  const ShadeRequest request = shading_of(plan, task.step.wave, run);
   const TaskStep parts{plan.lighting ? TaskKind::light : TaskKind::part};
   const std::optional<std::size_t> part = index_of(plan, parts, task.number, request.scene);
   if (!part) {
     remove_part(task.outputs.at(0));
     return false;
   }
-  request.bounces = task.step.wave;
-  if (task.step.wave > 1)
-    request.bounced = plan.output({TaskKind::join_bounce, task.step.wave - 1}, 0);
   shade_part(request, *part, task.outputs.at(0), progress);
   return true;
 }
 
 /// Chooses the settings that meet the error.
 void tune(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
-  ShadeRequest request = shading_of(plan, run);
-  if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
-  write_tuning(plan, choose_settings(request, task.outputs.at(0), progress));
+  write_tuning(plan, choose_settings(shading_of(plan, run), task.outputs.at(0), progress));
 }
 
 /// Returns the request that shades with the settings that were chosen.
@@ -176,8 +167,7 @@ ShadeRequest tuned_shading_of(const FarmPlan& plan, const RunOptions& run) {
 
 /// Shades a range. @return  whether it has written a file
 bool shade(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
-  ShadeRequest request = tuned_shading_of(plan, run);
-  if (plan.waves() > 0) request.bounced = plan.output({TaskKind::join_bounce, plan.waves()}, 0);
+  const ShadeRequest request = tuned_shading_of(plan, run);
   const RangeNumber range{task.number, plan.shading->ranges};
   const std::filesystem::path& target = task.outputs.at(0);
   if (plan.has_tiles()) {

@@ -64,13 +64,6 @@ void check_combination(const LightingRequest& request) {
 constexpr float kSparseSolidAngle = 0.06F, kSparseParallax = 0.3F;
 constexpr unsigned kSparseResolution = 16;
 
-/// Says whether a request leaves the settings of the gather as they are when nothing is said.
-bool has_usual_settings(const GatherOptions& gather) {
-  const GatherOptions usual;
-  return gather.solid_angle == usual.solid_angle && gather.parallax == usual.parallax &&
-         gather.inflation == usual.inflation && gather.resolution == usual.resolution;
-}
-
 /// Returns the length of the diagonal of a scene's bounds, scene units.
 double diagonal_of(const ContainerReader& scene) {
   const Superblock& s = scene.superblock();
@@ -98,6 +91,12 @@ const LightingRequest& checked(const LightingRequest& request) {
 }
 
 }  // namespace
+
+bool has_usual_settings(const GatherOptions& gather) noexcept {
+  const GatherOptions usual;
+  return gather.solid_angle == usual.solid_angle && gather.parallax == usual.parallax &&
+         gather.inflation == usual.inflation && gather.resolution == usual.resolution;
+}
 
 void check_ranges(const LightingRequest& request) {
   constexpr unsigned kMaxRays = 1 << 24, kMaxBounces = 1000;

@@ -94,6 +94,10 @@ struct LightingRequest {
 ///         range
 void check_ranges(const LightingRequest& request);
 
+/// Says whether the settings of a gather, between speed and error, are those that hold when nothing
+/// is said.
+[[nodiscard]] bool has_usual_settings(const GatherOptions& gather) noexcept;
+
 /// The damage of a scene that was shaded past damaged pages (spec/shading.md#damage).
 struct DamageReport {
   /// Damaged pages that the run needed, by number, with the rule that each breaks.

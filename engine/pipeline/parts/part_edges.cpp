@@ -98,6 +98,11 @@ void write_edges(const std::filesystem::path& part, const TreeEdges& edges) {
   write_shared_state(edges_path(part), state.take());
 }
 
+void remove_part(const std::filesystem::path& part) {
+  std::filesystem::remove(part);
+  std::filesystem::remove(edges_path(part));
+}
+
 TreeEdges edges_of(const ContainerReader& part, const Executor& executor) {
   const std::filesystem::path path = edges_path(part.path());
   if (!std::filesystem::exists(path)) return find_edges(part, executor);

@@ -19,6 +19,9 @@ namespace ptc {
 /// @throws FormatError when the part is damaged; std::system_error
 void write_edges(const std::filesystem::path& part, const TreeEdges& edges);
 
+/// Removes a part and its edges, as far as they are there. @throws std::system_error
+void remove_part(const std::filesystem::path& part);
+
 /// Reads the edges of a part from the file beside it, or finds them from its points where there is
 /// no such file, or one of another part.
 /// @param part  has at least one point
