@@ -24,7 +24,7 @@ namespace {
 
 constexpr char kDate[] = "2026-11-28";  // when these texts were last revised
 
-constexpr std::size_t kWidth = 80;  // of a line of roff
+constexpr std::size_t kRoffWidth = 80;  // of a line
 
 /// The programs that are installed, each of which has a manual page.
 constexpr std::array<std::string_view, 9> kPrograms{"ptcbake",   "ptcbuild", "ptcconvert",
@@ -57,13 +57,13 @@ std::string italic(const std::string& text) {
 }
 
 /// A text as lines of roff: each sentence begins a line, as roff expects, and no line is longer
-/// than kWidth unless it is one word.
+/// than kRoffWidth unless it is one word.
 std::string filled(const std::string& text) {
   std::string lines;
   std::string line;
   for (const std::string& word : split(text, ' ')) {
     const std::string next = roff(line.empty() ? word : line + " " + word);
-    if (!line.empty() && (line.ends_with('.') || next.size() > kWidth)) {
+    if (!line.empty() && (line.ends_with('.') || next.size() > kRoffWidth)) {
       lines += roff(line) + "\n";
       line.clear();
     }

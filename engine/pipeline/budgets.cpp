@@ -18,9 +18,8 @@ namespace {
 /// Minimum of bytes for a page cache, even where a cache for fewer pages would be possible.
 constexpr std::uint64_t kMinCacheBytes = std::uint64_t{16} << 20;
 
-/// Bytes of the direction buffers and receiver cells' lists of one thread. At most 14 MiB were
-/// measured, with receivers 80 surfels apart in a city of 20 million.
-constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
+/// Bytes of the direction buffers and receiver cells' lists of one thread (spec/notes/lists.md).
+constexpr std::uint64_t kGatherBytes = std::uint64_t{20} << 20;
 // Rays at the surfels are traced when no gather lives, in what was charged for gathers
 static_assert(DiscTracer::kBytes <= kGatherBytes);
 

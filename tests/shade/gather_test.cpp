@@ -38,6 +38,26 @@ glm::dmat3 tilted() {
          glm::dmat3(1, 0, 0, 0, std::cos(b), std::sin(b), 0, -std::sin(b), std::cos(b));
 }
 
+double terrain_height(double x, double y) {
+  return 0.05 * std::sin(17 * x) * std::cos(13 * y) + 0.02 * std::sin(41 * x + 29 * y);
+}
+
+/// A terrain over the unit square, of white surfels.
+std::vector<Surfel> terrain(double spacing) {
+  std::vector<Surfel> surfels;
+  for (double x = spacing / 2; x < 1; x += spacing) {
+    for (double y = spacing / 2; y < 1; y += spacing) {
+      const double dx = terrain_height(x + 1e-4, y) - terrain_height(x - 1e-4, y);
+      const double dy = terrain_height(x, y + 1e-4) - terrain_height(x, y - 1e-4);
+      surfels.push_back({.position = {x, y, terrain_height(x, y)},
+                         .normal = glm::vec3(glm::normalize(glm::dvec3(-dx, -dy, 2e-4))),
+                         .radius = static_cast<float>(0.8 * spacing),
+                         .radiance = glm::vec3(1)});
+    }
+  }
+  return surfels;
+}
+
 }  // namespace
 
 TEST_CASE("gather: a floor next to a wall gets the analytic form factor up to the crease",
@@ -416,6 +436,35 @@ TEST_CASE("gather: receivers of weight 0 have their part in cells, and take no w
   CHECK(each.work().clusters == Approx(whole.counts().clusters).epsilon(1e-6));
   CHECK(each.work().surfel_blocks == Approx(whole.counts().surfel_blocks).epsilon(1e-6));
   CHECK(each.counts().cells == whole.counts().cells);
+}
+
+TEST_CASE("gather: the lists of receivers that lie far apart do not grow with the scene",
+          "[shade][gather]") {
+  // Cells of them would open all of a terrain, and leave it to the cells within
+  constexpr double kSpacing = 0.0025;
+  Scene scene(terrain(kSpacing));
+  for (int i = 0; i < 64; ++i) {
+    const double x = 0.1 + 0.8 * (i % 8) / 7, y = 0.1 + 0.8 * (i / 8) / 7;
+    scene.receivers.push_back({{x, y, terrain_height(x, y) + 0.3 * kSpacing}, {0, 0, 1}});
+  }
+  const GatherOptions options{.solid_angle = 1e-5F};
+  const SceneView view(*scene.container);
+  PageCache cache(*scene.container, {.memory_bytes = 64U << 20, .threads = 2});
+  const DirectionGrid grid(options.resolution, {});
+  std::vector<Shading> together(64), alone(64);
+  Gather gather(view, cache, options);
+  gather.shade(scene.receivers, together, grid);
+  CHECK(gather.list_bytes() < std::size_t{8} << 20);
+  // What is left unopened is opened further in: each sees what it sees when it is shaded alone
+  Gather single(view, cache, options);
+  for (std::size_t i = 0; i < 64; ++i)
+    single.shade(std::span(scene.receivers).subspan(i, 1), std::span(alone).subspan(i, 1), grid);
+  CHECK(single.list_bytes() == 0);
+  const Errors errors = compare(together, alone);
+  CAPTURE(errors.occlusion_rms, errors.irradiance_rms, gather.list_bytes());
+  CHECK(errors.occlusion_mean > 0.03);
+  CHECK(errors.occlusion_rms < 0.004);
+  CHECK(errors.irradiance_rms < 0.02);
 }
 
 TEST_CASE("gather: receivers without anything near share the sums over one buffer",

@@ -20,6 +20,11 @@
 namespace ptc {
 namespace {
 
+// Things that a cell may leave before it leaves clusters to its children that it would open.
+// Without it, a cell of receivers that lie far apart leaves all surfels between them. Less costs
+// time: what a cell does not open is opened in several of its children (spec/notes/lists.md).
+constexpr std::size_t kManyLeft = 32768;
+
 // Calls `body` with the receivers of each occupied child of the smallest octree cell that holds
 // them all. Coincident receivers are handed over one by one.
 template <class Body>
@@ -149,7 +154,7 @@ void Gather::shade_cell(std::span<const PlacedReceiver> cell, const DirectionBuf
   const DirectionBuffer& drawn =
       collect(bounds, inherited, level.buffer, &level.left, depth, bound);
   add_work(cell, counted);
-  if (level.left.empty()) {
+  if (level.left.size() == 0) {
     resolve(cell, drawn, depth + 1, bound);
   } else {
     split(cell, [&](std::span<const PlacedReceiver> child) {
@@ -196,7 +201,7 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
                                        DirectionBuffer& own, NearLists* left, std::size_t depth,
                                        float& bound) {
   const SceneScale& scale = scene_.view().scale();
-  const CellTest test{
+  CellTest test{
       .cell = cell,
       .lengths = scale.length_factors(),
       .areas = scale.area_factors(),
@@ -220,29 +225,45 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
     own.draw(*grid_, queue_, options_.sides, static_cast<unsigned>(depth), horizon);
     queue_.size = 0;
   };
-  // Test what the cell around left
-  if (depth > 0) {
+  const auto is_full = [&] { return left && left->size() + opened_.size() > kManyLeft; };
+  const auto walk = [&] {  // the tree below what is on the stack
+    while (!stack_.empty()) {
+      const ChildRef next = stack_.back();
+      stack_.pop_back();
+      if (next.interior) {
+        limit.take_group();
+        test.full = is_full();
+        look_at_group(next, test, out);
+      } else {
+        limit.take_points(next.point_count);
+        look_at_run(next, test, out, flush);
+      }
+      if (queue_.full()) flush();
+    }
+  };
+  opened_.clear();
+  if (depth == 0) {
+    walk();
+  } else {
+    // Test what the cell around left
     const Level& around = *levels_[depth - 1];
+    const NearClusters& clusters = around.left.clusters;
     const glm::vec3 move((around.centre - cell.centre) * SceneScale::kLatticeUnit);
-    opened_.clear();
-    for (std::size_t i = 0; i < around.left.clusters.size; flush())
+    for (std::size_t i = 0; i < clusters.size; flush())
       i = look_at_clusters(around, i, move, test, out);
     for (std::size_t i = 0; i < around.left.surfels.size; flush())
       i = look_at_surfels(around, i, move, test, out);
-    for (const std::uint32_t i : opened_) push(payloads_[i]);
-  }
-  // Walk the tree below what is on the stack
-  while (!stack_.empty()) {
-    const ChildRef next = stack_.back();
-    stack_.pop_back();
-    if (next.interior) {
-      limit.take_group();
-      look_at_group(next, test, out);
-    } else {
-      limit.take_points(next.point_count);
-      look_at_run(next, test, out, flush);
+    // Walk below those that are to be opened, or leave them as they are
+    while (!opened_.empty()) {
+      const std::uint32_t i = opened_.back();
+      opened_.pop_back();
+      if (is_full()) {
+        left->clusters.take(clusters, i, move);
+      } else {
+        push(payloads_[clusters.payload[i]]);
+        walk();
+      }
     }
-    if (queue_.full()) flush();
   }
   flush();
   bound += out.stand_in_share;
@@ -266,6 +287,13 @@ std::size_t Gather::look_at_surfels(const Level& around, std::size_t from, const
   counts_.surfels += static_cast<unsigned>(queue_.size - before);
   counts_.retests += next - from;
   return next;
+}
+
+std::size_t Gather::list_bytes() const noexcept {
+  std::size_t bytes = payloads_.capacity() * sizeof(ClusterPayload);
+  for (const auto& level : levels_)
+    bytes += level->left.clusters.bytes() + level->left.surfels.bytes();
+  return bytes;
 }
 
 void Gather::push(const ClusterPayload& payload) {

@@ -28,8 +28,8 @@ namespace ptc {
 /// The results depend on the receivers of the call and on the options alone, not on the cache, the
 /// order of pages or what was shaded before.
 /// Threads: one gather for each thread.
-/// Memory: a direction buffer (48 KiB at resolution 32) for each level of receiver cells, and
-/// lists.
+/// Memory: a direction buffer (48 KiB at resolution 32) for each level of receiver cells, and lists
+/// of what cells leave to those within them, at most list_bytes().
 class Gather {
  public:
   /// @param view        must outlive the gather, as must the cache
@@ -51,6 +51,9 @@ class Gather {
              const DirectionGrid& grid, std::span<const float> weights = {});
   /// The counts of all calls so far.
   [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
+  /// Bytes of the lists of what cells leave to those within them: the most that any call took. They
+  /// do not grow with the scene, because a cell whose lists are full opens no more clusters.
+  [[nodiscard]] std::size_t list_bytes() const noexcept;
   /// What the receivers of the last call take of the work, if it had weights: each its share of
   /// what it has in common with the whole call, whether that was shaded or not.
   [[nodiscard]] const GatherWork& work() const noexcept { return work_; }
@@ -99,7 +102,7 @@ class Gather {
   std::vector<ClusterPayload>
       payloads_;                       ///< clusters that the current cells left, outer cells first
   std::vector<ChildRef> stack_;        ///< nodes to visit
-  std::vector<std::uint32_t> opened_;  ///< indices into payloads_ of clusters to open
+  std::vector<std::uint32_t> opened_;  ///< clusters to open, of those that the cell around left
   DirectionBuffer empty_, leaf_;
   DiscQueue queue_;
   std::optional<Openings> openings_;

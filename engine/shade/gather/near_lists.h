@@ -13,7 +13,13 @@
 #include <cstdint>
 #include <vector>
 
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
 namespace ptc {
+
+/// Relative rounding error of cell-relative lengths after a few float operations.
+inline constexpr float kRounding = 4e-7F;
 
 /// Entries past the last one that a kernel may read and write.
 inline constexpr std::size_t kListLanes = 8;
@@ -21,6 +27,13 @@ inline constexpr std::size_t kListLanes = 8;
 inline constexpr std::uint32_t kInterior = 1;  ///< bit of ClusterPayload::kind: has a group below
 inline constexpr std::uint32_t kClosed = 2;    ///< bit of ClusterPayload::kind: its children are
                                                ///< lost, so it is drawn and never opened
+
+/// Makes a column longer than is wanted now: resize() alone may take twice what it is asked for.
+template <class T>
+void lengthen(std::vector<T>& column, std::size_t wanted) {
+  column.reserve(wanted + wanted / 4);
+  column.resize(wanted + wanted / 4);
+}
 
 /// The part of a cluster that is needed only to draw or to open it; the rest is in NearClusters.
 /// It fills one cache line. Axes are ordered +x -x +y -y +z -z.
@@ -47,8 +60,29 @@ struct NearClusters {
     const std::size_t wanted = size + more + kListLanes;
     if (x.size() >= wanted) return;
     for (auto* column : {&x, &y, &z, &radius, &thickness, &mean_x, &mean_y, &mean_z})
-      column->resize(2 * wanted);
-    payload.resize(2 * wanted);
+      lengthen(*column, wanted);
+    lengthen(payload, wanted);
+  }
+  /// Appends a cluster that the enclosing cell left. Radius and thickness grow by the rounding of
+  /// the position.
+  /// @param i     its index there
+  /// @param move  is added to its position
+  void take(const NearClusters& around, std::size_t i, const glm::vec3& move) {
+    make_room(1);
+    const glm::vec3 to = glm::vec3(around.x[i], around.y[i], around.z[i]) + move;
+    const float rounding = kRounding * glm::length(to);
+    x[size] = to.x;
+    y[size] = to.y;
+    z[size] = to.z;
+    radius[size] = around.radius[i] + rounding;
+    thickness[size] = around.thickness[i] + rounding;
+    mean_x[size] = around.mean_x[i];
+    mean_y[size] = around.mean_y[i];
+    mean_z[size] = around.mean_z[i];
+    payload[size++] = around.payload[i];
+  }
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return (8 * sizeof(float) + sizeof(std::uint32_t)) * payload.capacity();
   }
 };
 
@@ -63,8 +97,11 @@ struct NearSurfels {
   void make_room(std::size_t more) {
     const std::size_t wanted = size + more + kListLanes;
     if (x.size() >= wanted) return;
-    for (auto* column : {&x, &y, &z, &nx, &ny, &nz, &radius}) column->resize(2 * wanted);
-    rgbe.resize(2 * wanted);
+    for (auto* column : {&x, &y, &z, &nx, &ny, &nz, &radius}) lengthen(*column, wanted);
+    lengthen(rgbe, wanted);
+  }
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return (7 * sizeof(float) + sizeof(std::uint32_t)) * rgbe.capacity();
   }
 };
 
@@ -73,8 +110,8 @@ struct NearLists {
   NearClusters clusters;
   NearSurfels surfels;
 
-  /// Reports whether nothing is left.
-  [[nodiscard]] bool empty() const noexcept { return clusters.size == 0 && surfels.size == 0; }
+  /// Returns the number of things that are left.
+  [[nodiscard]] std::size_t size() const noexcept { return clusters.size + surfels.size; }
   /// Empties the lists; their memory stays.
   void clear() noexcept { clusters.size = surfels.size = 0; }
 };

@@ -223,9 +223,6 @@ HWY_INLINE void push(DiscQueue& queue, MF mask, const Vec& to, const Vec& normal
   queue.size += static_cast<int>(append(rgbe, hn::RebindMask(u, mask), u, queue.rgbe + at));
 }
 
-/// Relative rounding error of cell-relative lengths after a few float operations.
-constexpr float kRounding = 4e-7F;
-
 /// Returns how high the middle of a thing may rise over the horizon of any receiver of the cell, a
 /// length: the greatest p . n over the normals of the cone, plus how far receivers lie below the
 /// centre, plus what rounding may take from both.

@@ -114,8 +114,9 @@ HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wante
   if (test.last) return {drawn, large, hn::FirstN(f, 0), stand_in};
   // Open large ones that every receiver would open, or whose parts are all far enough to share.
   const auto farthest = hn::Add(d, rho);
-  const auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
-                            hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
+  auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
+                      hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
+  if (test.full) opens = hn::FirstN(f, 0);
   // Keep small ones in the seam. Some part of a cluster that faces many ways is seen from the front
   // everywhere, so the height over its plane counts as d (1 - |S|) at least.
   const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), c.length), hn::Zero(f)));
@@ -511,8 +512,9 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     }
     if (!hn::AllFalse(f, verdict.open)) {
       opened.resize(opened.size() + lanes);
-      const std::size_t count = append(payload, hn::RebindMask(u, verdict.open), u,
-                                       opened.data() + opened.size() - lanes);
+      const auto index = hn::Iota(u, static_cast<std::uint32_t>(from));
+      const std::size_t count =
+          append(index, hn::RebindMask(u, verdict.open), u, opened.data() + opened.size() - lanes);
       opened.resize(opened.size() - lanes + count);
     }
     if (!hn::AllFalse(f, verdict.keep)) leave(out.left->clusters, verdict.keep, c, d, payload);
