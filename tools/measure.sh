@@ -73,9 +73,9 @@ measure accuracy accuracy fractal window city "$mesh+backdrop" --quick --points 
   "$mesh+backdrop" --points 2k --checked 10 --reference-rays 64 --set points --method ptcx --method embree-mesh "${once[@]}"
 measure build build --points 20M --points 60M --panel points --memory 1G -- --points 20k --panel points "${once[@]}"
 measure build-cap build --points 20M --panel cap -- --points 200k --panel cap --cap 96M "${once[@]}"
-measure cache cache --quick --points 6M --receivers 16384 --repeats 5 -- --points 20k --receivers 4096 --panel hits --panel receivers "${once[@]}"
+measure cache cache --quick --points 6M --receivers 16384 --repeats 5 -- --points 20k --receivers 1024 --panel hits --panel receivers "${once[@]}"
 measure cache-threads cache --panel threads --receivers 16384 -- \
-  --panel threads --points 20k --receivers 4096 "${once[@]}"
+  --panel threads --points 20k --receivers 1024 "${once[@]}"
 measure demo demo "$mesh+backdrop" --memory 256M -- "$mesh+backdrop" --points 5k --checked 20 "${once[@]}"
 measure demo-city demo city --points 20M --receivers 100k --memory 256M --stage build --stage verify --stage shade -- \
   city --points 5k --receivers 1k --stage build --stage verify --stage shade "${once[@]}"
@@ -88,12 +88,12 @@ measure formats formats -- --points 20k "${once[@]}"
 measure glossy glossy city "$mesh" -- city --points 4k --checked 20 "${once[@]}"
 measure growth growth --quick --repeats 5 --points 500k --points 2M --points 6M --panel surfels --panel solid-angle --panel depth -- \
   --points 4k --points 8k --checked 10 --panel surfels "${once[@]}"
-measure hunt hunt -- --scenes 20
-measure instructions instructions -- --points 10k --receivers 4096 --checked 10 "${once[@]}"
+measure hunt hunt -- --scenes 5
+measure instructions instructions -- --points 10k --receivers 1024 --checked 10 "${once[@]}"
 measure knob knob -- cornell --points 2k --checked 64 --check-rays 256 --seeds 1 --set points
 measure model model fractal window city "$mesh+backdrop" --quick --repeats 5 -- \
   "$mesh+backdrop" --points 2k --checked 10 "${once[@]}"
-measure mutations mutations -- --every 10007
+measure mutations mutations -- --every 40009
 measure relight relight fractal window city "$mesh+backdrop" -- fractal --points 4k --checked 50 "${once[@]}"
 measure remote remote -- --points 20k
 measure rooms rooms -- --points 5k --paths 32
@@ -107,7 +107,7 @@ measure sort-200m sort --points 200M --panel disk --order city --memory 1G -- \
 measure specks specks "$mesh" city -- "$mesh" --points 5k --checked 50
 measure stability stability -- --row 3 --row 12
 measure surfels surfels fractal window cornell "$mesh+backdrop" -- cornell --points 2k "${once[@]}"
-measure tolerance tolerance fractal window cornell city "$mesh+backdrop" -- cornell --points 4k --receivers 200 "${once[@]}"
+measure tolerance tolerance fractal window cornell city "$mesh+backdrop" -- cornell --points 2k --receivers 100 "${once[@]}"
 measure truth truth --points 100k --size 128x96 --paths 512 --python python3 -- --paths 32 --points 5k --size 32x24
 measure verify verify --points 20M --threads 1 -- --points 20k "${once[@]}"
 

@@ -59,8 +59,6 @@ glm::vec3 parse_colour(const std::string& option, const std::string& text) {
 /// Factors from a unit to the one that a light is kept in, by name; "" is for numbers without one.
 using Units = std::map<std::string_view, double>;
 
-constexpr std::uint64_t kMaxShadowRays = 1 << 16;  // from a point to lights of one kind
-
 /// Units of intensity in W/sr. Power is that of a lamp that shines in all directions, also that of
 /// a spot light: so Blender and its glTF exporter have it.
 const Units& intensity_units() {
@@ -321,17 +319,17 @@ void note_unknown_up(const std::vector<std::filesystem::path>& files, const std:
 }
 
 void add_shadow_rays(CLI::App& app, LightSampling& sampling) {
-  add_integer(app, "--sun-rays", sampling.sun_rays, 1, kMaxShadowRays,
+  add_integer(app, "--sun-rays", sampling.sun_rays, 1, LightSampling::kMost,
               "Shadow rays from each point to each sun")
       ->group(kExpertGroup);
-  add_integer(app, "--area-rays", sampling.area_rays, 1, kMaxShadowRays,
+  add_integer(app, "--area-rays", sampling.area_rays, 1, LightSampling::kMost,
               "Shadow rays from each point to what emits light")
       ->group(kExpertGroup);
 }
 
 void add_light_sampling(CLI::App& app, LightSampling& sampling) {
   add_shadow_rays(app, sampling);
-  add_integer(app, "--sky-rays", sampling.sky_rays, 0, kMaxShadowRays,
+  add_integer(app, "--sky-rays", sampling.sky_rays, 0, LightSampling::kMost,
               "Shadow rays from each point to the sky")
       ->group(kExpertGroup);
 }

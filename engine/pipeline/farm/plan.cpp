@@ -31,10 +31,9 @@ namespace {
 
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
-constexpr std::uint64_t kRangePoints = 1'000'000;   // that a task shades
-constexpr double kMaxSeconds = 1e9;                 // of a task
-constexpr std::uint64_t kMaxShares = 10'000;        // of a file
-constexpr std::uint32_t kMaxShadowRays = 1U << 16;  // of a point to lights of one kind
+constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
+constexpr double kMaxSeconds = 1e9;                // of a task
+constexpr std::uint64_t kMaxShares = 10'000;       // of a file
 
 /// @param lit  the points are lit anew
 void check_inputs(const BuildInputs& inputs, bool lit) {
@@ -101,7 +100,7 @@ void check_lighting(const LightRequest& lighting) {
   check_ranges(lighting);
   check_lights(lighting.lights.value());
   const auto check_rays = [](unsigned rays, const char* field) {
-    require_request(rays >= 1 && rays <= kMaxShadowRays, field,
+    require_request(rays >= 1 && rays <= LightSampling::kMost, field,
                     "a point has 1 to 65536 shadow rays to lights of a kind");
   };
   check_rays(lighting.light_sampling.sun_rays, "light_sampling.sun_rays");

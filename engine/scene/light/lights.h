@@ -188,6 +188,8 @@ SkyMap load_sky_map(Sky& sky, const std::filesystem::path& directory, TextureSto
 
 /// Numbers of shadow rays for one surface point; 0 leaves the lights of that kind out.
 struct LightSampling {
+  static constexpr unsigned kMost = 1U << 16;  ///< that programs take, of each
+
   unsigned sun_rays = 4;    ///< for each sun; a sun of angular radius 0 takes 1 in any case
   unsigned area_rays = 16;  ///< over all emissive triangles, by what each may give to the point
   unsigned sky_rays = 64;   ///< cosine-distributed; with a map, half of them by its brightness
