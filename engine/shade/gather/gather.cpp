@@ -20,10 +20,12 @@
 namespace ptc {
 namespace {
 
-// Things that a cell may leave before it leaves clusters to its children that it would open.
-// Without it, a cell of receivers that lie far apart leaves all surfels between them. Less costs
-// time: what a cell does not open is opened in several of its children (spec/notes/lists.md).
+// A cell that has left more things than this leaves near clusters unopened to its children. Without
+// the limit, a cell of receivers that lie far apart leaves all surfels between them. A lower one
+// costs time: what a cell does not open is opened in several of its children (spec/notes/lists.md).
 constexpr std::size_t kManyLeft = 32768;
+// One that has left more than this leaves all clusters that it would open.
+constexpr std::size_t kMostLeft = 3 * kManyLeft / 2;
 
 // Calls `body` with the receivers of each occupied child of the smallest octree cell that holds
 // them all. Coincident receivers are handed over one by one.
@@ -225,14 +227,18 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
     own.draw(*grid_, queue_, options_.sides, static_cast<unsigned>(depth), horizon);
     queue_.size = 0;
   };
-  const auto is_full = [&] { return left && left->size() + opened_.size() > kManyLeft; };
+  const auto kept_within = [&] {
+    const std::size_t things = left ? left->size() + opened_.size() : 0;
+    if (things > kMostLeft) return std::numeric_limits<float>::infinity();
+    return things > kManyLeft ? test.shared_from : 0;
+  };
   const auto walk = [&] {  // the tree below what is on the stack
     while (!stack_.empty()) {
       const ChildRef next = stack_.back();
       stack_.pop_back();
       if (next.interior) {
         limit.take_group();
-        test.full = is_full();
+        test.kept_within = kept_within();
         look_at_group(next, test, out);
       } else {
         limit.take_points(next.point_count);
@@ -253,11 +259,11 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
       i = look_at_clusters(around, i, move, test, out);
     for (std::size_t i = 0; i < around.left.surfels.size; flush())
       i = look_at_surfels(around, i, move, test, out);
-    // Walk below those that are to be opened, or leave them as they are
+    // Walk below those that are to be opened, or leave them to the children
     while (!opened_.empty()) {
       const std::uint32_t i = opened_.back();
       opened_.pop_back();
-      if (is_full()) {
+      if (clusters.is_within(kept_within(), i, move)) {
         left->clusters.take(clusters, i, move);
       } else {
         push(payloads_[clusters.payload[i]]);

@@ -29,7 +29,7 @@ namespace ptc {
 /// order of pages or what was shaded before.
 /// Threads: one gather for each thread.
 /// Memory: a direction buffer (48 KiB at resolution 32) for each level of receiver cells, and lists
-/// of what cells leave to those within them, at most list_bytes().
+/// of what cells leave to those within them (spec/notes/lists.md).
 class Gather {
  public:
   /// @param view        must outlive the gather, as must the cache
@@ -51,8 +51,8 @@ class Gather {
              const DirectionGrid& grid, std::span<const float> weights = {});
   /// The counts of all calls so far.
   [[nodiscard]] const GatherCounts& counts() const noexcept { return counts_; }
-  /// Bytes of the lists of what cells leave to those within them: the most that any call took. They
-  /// do not grow with the scene, because a cell whose lists are full opens no more clusters.
+  /// Returns the bytes of the lists of what cells leave to those within them, as long as they were
+  /// in any call so far.
   [[nodiscard]] std::size_t list_bytes() const noexcept;
   /// What the receivers of the last call take of the work, if it had weights: each its share of
   /// what it has in common with the whole call, whether that was shaded or not.

@@ -28,6 +28,12 @@ inline constexpr std::uint32_t kInterior = 1;  ///< bit of ClusterPayload::kind:
 inline constexpr std::uint32_t kClosed = 2;    ///< bit of ClusterPayload::kind: its children are
                                                ///< lost, so it is drawn and never opened
 
+/// Makes room for `more` elements and a quarter beyond: a vector by itself takes twice as much.
+template <class T>
+void make_room_in(std::vector<T>& elements, std::size_t more) {
+  const std::size_t wanted = elements.size() + more;
+  if (wanted > elements.capacity()) elements.reserve(wanted + wanted / 4);
+}
 /// Makes a column longer than is wanted now: resize() alone may take twice what it is asked for.
 template <class T>
 void lengthen(std::vector<T>& column, std::size_t wanted) {
@@ -62,6 +68,11 @@ struct NearClusters {
     for (auto* column : {&x, &y, &z, &radius, &thickness, &mean_x, &mean_y, &mean_z})
       lengthen(*column, wanted);
     lengthen(payload, wanted);
+  }
+  /// Reports whether all of a cluster is nearer than a distance.
+  /// @param move  is added to its position
+  [[nodiscard]] bool is_within(float distance, std::size_t i, const glm::vec3& move) const {
+    return glm::length(glm::vec3(x[i], y[i], z[i]) + move) + radius[i] < distance;
   }
   /// Appends a cluster that the enclosing cell left. Radius and thickness grow by the rounding of
   /// the position.

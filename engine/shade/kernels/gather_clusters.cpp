@@ -114,9 +114,9 @@ HWY_INLINE Verdict judge(const CellTest& test, const Clusters& c, VF d, MF wante
   if (test.last) return {drawn, large, hn::FirstN(f, 0), stand_in};
   // Open large ones that every receiver would open, or whose parts are all far enough to share.
   const auto farthest = hn::Add(d, rho);
-  auto opens = hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
-                      hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest))));
-  if (test.full) opens = hn::FirstN(f, 0);
+  const auto opens = hn::And(hn::Or(hn::Ge(hn::Sub(d, c.radius), shared_from),
+                                    hn::Ge(r2, hn::Mul(limit, hn::Mul(farthest, farthest)))),
+                             hn::Ge(hn::Add(d, c.radius), hn::Set(f, test.kept_within)));
   // Keep small ones in the seam. Some part of a cluster that faces many ways is seen from the front
   // everywhere, so the height over its plane counts as d (1 - |S|) at least.
   const auto scattered = hn::Mul(d, hn::Max(hn::Sub(hn::Set(f, 1.0F), c.length), hn::Zero(f)));
@@ -460,6 +460,7 @@ unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& t
     const auto next = static_cast<std::uint32_t>(out.payloads.size());
     unsigned rest = bits_of(f, verdict.keep);
     alignas(64) std::uint32_t index[kListLanes] = {};
+    make_room_in(out.payloads, kListLanes);
     for (std::uint32_t count = 0; rest != 0; rest &= rest - 1) {
       const int lane = std::countr_zero(rest);
       index[lane] = next + count++;
@@ -478,6 +479,7 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
   const F f;
   const U u;
   const std::size_t lanes = hn::Lanes(f);
+  const auto numbers = hn::Iota(u, 0U);  // of lanes; Iota() is slow
   const Vec moved = spread(move);
   for (; from < near.size && !out.queue.full(); from += lanes) {
     // Load clusters relative to this cell's centre, and drop those that no receiver sees.
@@ -512,12 +514,14 @@ std::size_t gather_clusters(const NearClusters& near, std::size_t from, const gl
     }
     if (!hn::AllFalse(f, verdict.open)) {
       opened.resize(opened.size() + lanes);
-      const auto index = hn::Iota(u, static_cast<std::uint32_t>(from));
+      const auto index = hn::Add(numbers, hn::Set(u, static_cast<std::uint32_t>(from)));
       const std::size_t count =
           append(index, hn::RebindMask(u, verdict.open), u, opened.data() + opened.size() - lanes);
       opened.resize(opened.size() - lanes + count);
     }
-    if (!hn::AllFalse(f, verdict.keep)) leave(out.left->clusters, verdict.keep, c, d, payload);
+    if (hn::AllFalse(f, verdict.keep)) continue;
+    out.left->clusters.make_room(kListLanes);
+    leave(out.left->clusters, verdict.keep, c, d, payload);
   }
   return std::min(from, near.size);
 }
@@ -539,7 +543,6 @@ unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& t
 std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move,
                             const CellTest& test, CellOutput& out,
                             std::vector<std::uint32_t>& opened) {
-  if (out.left) out.left->clusters.make_room(near.size - from);
   return HWY_DYNAMIC_DISPATCH(gather_clusters)(near, from, move, test, out, opened);
 }
 

@@ -7,14 +7,15 @@
 //     draw    it is small enough, and far enough to look the same to all receivers of the cell
 //     open    it is a cluster that is too large for every receiver, or far enough although it is
 //             too large for some: its children are looked at for this cell
-//     keep    it is near, or only some receivers would open it, or what the cell leaves is full:
-//     the
-//             cells within look at it again
+//     keep    it is near, or only some receivers would open it: the cells within look at it again
 //
 //                  near: d < rho / parallax         far
 //     small        keep                             draw
 //     not small    open when every receiver of      open
 //                  the cell would, else keep
+//
+// A cell that has kept much also keeps what it would open, where all of that is near: it would keep
+// the parts (CellTest::kept_within).
 //
 // d is the distance from the cell's centre and rho the cell's radius; a surfel is always small.
 // A small thing just beyond the border is drawn and kept as well, so that no gap opens
@@ -49,7 +50,7 @@ struct CellTest {
   bool emission = true;       ///< whether what surfels emit is part of their colours
   bool last = false;          ///< whether everything is settled and nothing left to children
   bool damaged = false;       ///< whether some clusters may be closed: drawn, and never opened
-  bool full = false;          ///< whether clusters that the cell would open are kept
+  float kept_within = 0;      ///< clusters all of which is nearer are never opened
 };
 
 /// The output of a cell: what it draws, and what it leaves to its children. Positions are relative
@@ -72,7 +73,7 @@ unsigned gather_group(const GroupView& group, unsigned closed, const CellTest& t
 
 /// Looks at clusters that the enclosing cell left, from index `from` on, until the queue is full.
 /// @param move    is added to positions: the enclosing cell's centre relative to this one's
-/// @param opened  indices of clusters that are to be replaced by their children, appended
+/// @param opened  indices in `near` of clusters that are to be replaced by their children, appended
 /// @return        the first index that it has not looked at; near.size at the end
 std::size_t gather_clusters(const NearClusters& near, std::size_t from, const glm::vec3& move,
                             const CellTest& test, CellOutput& out,

@@ -98,6 +98,7 @@ HWY_INLINE void settle(const CellTest& test, const PageSurfels& s, MF wanted, co
   if (!hn::AllFalse(f, drawn)) push(out.queue, drawn, s.to, s.normal, s.radius, rgbe);
   if (hn::AllFalse(f, keep)) return;
   NearSurfels& left = out.left->surfels;
+  left.make_room(kListLanes);
   const std::size_t at = left.size;
   append(s.to.x, keep, f, left.x.data() + at);
   append(s.to.y, keep, f, left.y.data() + at);
@@ -167,13 +168,11 @@ HWY_EXPORT(gather_surfels);
 void gather_page_surfels(const std::byte* payload, std::uint32_t count, bool emits,
                          std::uint32_t first, unsigned number, const CellTest& test,
                          CellOutput& out) {
-  if (out.left) out.left->surfels.make_room(number);
   HWY_DYNAMIC_DISPATCH(gather_page_surfels)(payload, count, emits, first, number, test, out);
 }
 
 std::size_t gather_surfels(const NearSurfels& near, std::size_t from, const glm::vec3& move,
                            const CellTest& test, CellOutput& out) {
-  if (out.left) out.left->surfels.make_room(near.size - from);
   return HWY_DYNAMIC_DISPATCH(gather_surfels)(near, from, move, test, out);
 }
 
