@@ -20,8 +20,10 @@ constexpr std::uint64_t kMinCacheBytes = std::uint64_t{16} << 20;
 
 /// Bytes of the direction buffers and receiver cells' lists of one thread (spec/notes/lists.md).
 constexpr std::uint64_t kGatherBytes = std::uint64_t{16} << 20;
-/// Bytes that each point of a leaf adds: a cell may open the 8 leaves of a group at once, and so
-/// may those around it, of which some 8 leave as much.
+/// Points of a leaf that these bytes have room for.
+constexpr std::uint64_t kUsualLeaf = 64;
+/// Bytes that each further point of a leaf adds: a cell may open the 8 leaves of a group at once,
+/// and so may those around it, of which some 8 leave as much.
 constexpr std::uint64_t kLeafPointBytes = std::uint64_t{8} * 40 * 8;
 // Rays at the surfels are traced when no gather lives, in what was charged for gathers
 static_assert(DiscTracer::kBytes <= kGatherBytes);
@@ -89,8 +91,9 @@ void charge_mesh(MemoryBudget& budget, const Mesh& mesh, const RayScene* rays) {
 std::uint64_t cache_bytes_left(MemoryBudget budget, const ContainerReader& scene, unsigned gathers,
                                unsigned readers, BackEnd back_end) {
   charge_directory(budget, scene);
+  const std::uint64_t leaf = std::max<std::uint64_t>(scene.superblock().leaf_points, kUsualLeaf);
   budget.charge("threads that gather",
-                gathers * (kGatherBytes + kLeafPointBytes * scene.superblock().leaf_points));
+                gathers * (kGatherBytes + kLeafPointBytes * (leaf - kUsualLeaf)));
   return budget.rest("the page cache",
                      std::max(kMinCacheBytes, PageCache::min_bytes(scene, readers, back_end)));
 }
