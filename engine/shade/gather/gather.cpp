@@ -23,7 +23,7 @@ namespace {
 // A cell that has left more things than this leaves near clusters unopened to its children. Without
 // the limit, a cell of receivers that lie far apart leaves all surfels between them. A lower one
 // costs time: what a cell does not open is opened in several of its children (spec/notes/lists.md).
-constexpr std::size_t kManyLeft = 32768;
+constexpr std::size_t kManyLeft = 24576;
 // One that has left more than this leaves all clusters that it would open.
 constexpr std::size_t kMostLeft = 3 * kManyLeft / 2;
 
