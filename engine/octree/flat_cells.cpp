@@ -165,10 +165,10 @@ class Side {
 };
 
 /// The stream that merge_flat_cells() returns.
-class MergedStream : public PointStream {
+class FlatCellStream : public PointStream {
  public:
-  MergedStream(PointStream& sorted, double unit, const Flatness& most, const SurfaceGoesOn& goes_on,
-               MergeCounts& counts)
+  FlatCellStream(PointStream& sorted, double unit, const Flatness& most,
+                 const SurfaceGoesOn& goes_on, MergeCounts& counts)
       : sorted_(sorted), rules_{unit, most, goes_on, counts, handed_out_}, block_(kBlock) {}
 
   std::size_t next(std::span<PointRecord> out) override {
@@ -286,7 +286,7 @@ double MergeCounts::albedo_error() const noexcept {
 std::unique_ptr<PointStream> merge_flat_cells(PointStream& sorted, double unit,
                                               const Flatness& most, const SurfaceGoesOn& goes_on,
                                               MergeCounts& counts) {
-  return std::make_unique<MergedStream>(sorted, unit, most, goes_on, counts);
+  return std::make_unique<FlatCellStream>(sorted, unit, most, goes_on, counts);
 }
 
 }  // namespace ptc

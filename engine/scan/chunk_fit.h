@@ -21,6 +21,9 @@ inline constexpr std::size_t kLinks = 16;
 /// A link that does not exist.
 inline constexpr std::uint32_t kNoLink = 0xffffffff;
 
+/// Neighbours without which there is no plane through a place.
+inline constexpr int kPlaneNeighbours = 3;
+
 /// What the neighbours of a place say about it. Lengths are in lattice units.
 struct PlaceFit {
   std::array<float, 3> normal{};      ///< unit, of either side

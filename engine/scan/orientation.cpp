@@ -13,7 +13,6 @@ namespace {
 using Vec3 = std::array<float, 3>;
 
 constexpr float kGrazing = 0.1F;      // cosine below which a known direction decides no side alone
-constexpr int kFewest = 3;            // neighbours without which there is no plane
 constexpr float kDoubt = 0.6F;        // |m| up to which a vote says nothing
 constexpr float kNoiseReach = 2;      // offsets along normals that noise explains, in its RMS
 constexpr int kSafe = kFullVote / 2;  // of a single vote, to join places in a block
@@ -106,7 +105,7 @@ class ChunkOrientation {
         continue;
       }
       const auto towards = sides.towards(place, chunk_.positions[i]);
-      if (chunk_.fits[i].count < kFewest) {
+      if (chunk_.fits[i].count < kPlaneNeighbours) {
         normal = towards.value_or(sides.up());
         continue;
       }

@@ -25,7 +25,6 @@
 namespace ptc {
 namespace {
 
-constexpr int kFewest = 3;            // neighbours without which there is no plane
 constexpr float kLonely = 10;         // spacings to the nearest neighbour of an isolated point
 constexpr float kApart = 2.5F;        // the same for one that also lies off the surface
 constexpr float kOff = 1.5F;          // spacings by which it lies off
@@ -87,7 +86,7 @@ float radius_of(const ScanChunk& chunk, std::size_t i) noexcept {
 }
 
 std::uint8_t facts_of(const PlaceFit& fit) noexcept {
-  if (fit.count < kFewest) return 0;
+  if (fit.count < kPlaneNeighbours) return 0;
   const bool off = fit.offset > std::max(kOff * fit.spread, kOffNoise * fit.noise);
   const bool isolated =
       fit.nearest > kLonely * fit.spread || (off && fit.nearest > kApart * fit.spread);
@@ -99,7 +98,7 @@ std::uint8_t facts_of(const PlaceFit& fit) noexcept {
 /// in eighths of a radius.
 /// @param height  of the surface above the place, on the side of the receiver
 std::uint8_t rise_of(const PlaceFit& fit, float height, float radius) noexcept {
-  if (!(radius > 0) || fit.count < kFewest) return 0;
+  if (!(radius > 0) || fit.count < kPlaneNeighbours) return 0;
   const float steps = 8 * (height + kClear * fit.noise) / radius;
   return static_cast<std::uint8_t>(std::clamp(steps + 0.5F, 0.0F, float{kMostRise}));
 }

@@ -24,7 +24,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kMaxVolumes = 1 << 10;
-constexpr std::size_t kPieceBytes = std::size_t{2} << 20;  // written by one call
+constexpr std::size_t kWriteBytes = std::size_t{2} << 20;  // written by one call
 
 // The i-th of `count` sample positions in [0, size). There is one in each of `count` equal strides,
 // at a pseudorandom place in it, so that records that repeat with a period do not mislead the
@@ -79,10 +79,10 @@ void read_piece(const SpillFile& file, const SpillReader::Piece& piece,
 /// Writes a range by several transfers at once.
 void write_pieces(DirectFile& file, std::uint64_t offset, std::span<const std::byte> bytes) {
   for_each_transfer(
-      (bytes.size() + kPieceBytes - 1) / kPieceBytes, [&](std::size_t i, std::size_t) {
-        const std::size_t begin = i * kPieceBytes;
+      (bytes.size() + kWriteBytes - 1) / kWriteBytes, [&](std::size_t i, std::size_t) {
+        const std::size_t begin = i * kWriteBytes;
         file.write_at(offset + begin,
-                      bytes.subspan(begin, std::min(kPieceBytes, bytes.size() - begin)));
+                      bytes.subspan(begin, std::min(kWriteBytes, bytes.size() - begin)));
       });
 }
 

@@ -6,14 +6,13 @@
 #include <optional>
 #include <string>
 
+#include "engine/store/clauses.h"
 #include "engine/store/structure.h"
 #include "format/checksum.h"
 
 namespace ptc {
 namespace {
 
-constexpr char kMagic[] = "spec/container.md#superblock-magic";
-constexpr char kLength[] = "spec/container.md#superblock-length";
 constexpr char kCopies[] = "spec/container.md#superblock-copies";
 constexpr char kDirectoryPages[] = "spec/container.md#directory-pages";
 
@@ -39,13 +38,14 @@ bool is_superblock(const Block& block, const FileHeader& header, std::uint64_t f
 
 [[noreturn]] void refuse_length(std::uint64_t is, std::uint64_t committed) {
   const std::string by = std::to_string(is > committed ? is - committed : committed - is);
-  throw FormatError(is, kLength,
+  throw FormatError(is, clause::kSuperblockLength,
                     "the file is " + by + (is > committed ? " bytes longer" : " bytes shorter") +
                         " than its superblock says");
 }
 
 [[noreturn]] void refuse_without_superblock(std::uint64_t size) {
-  throw FormatError(size, kMagic, "no superblock at the end: the file is unfinished or truncated");
+  throw FormatError(size, clause::kSuperblockMagic,
+                    "no superblock at the end: the file is unfinished or truncated");
 }
 
 /// Decodes the copy to trust of two at the end of a file, or explains why there is none.
@@ -59,7 +59,7 @@ Superblock trusted_copy(const InputFile& file, const FileHeader& header, std::ui
     return decode_superblock(blocks[copy], header, file.size());
   } catch (const FormatError& error) {
     // A superblock of another length explains what is wrong, unless a whole one has this length.
-    if (!whole || error.clause() == kLength) {
+    if (!whole || error.clause() == clause::kSuperblockLength) {
       if (const auto length = committed_length(file, header)) refuse_length(file.size(), *length);
     }
     if (!whole && !has_superblock_magic(blocks[copy])) refuse_without_superblock(file.size());

@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "engine/store/clauses.h"
 #include "format/checksum.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
@@ -15,7 +16,6 @@ namespace {
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
 constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kReferences[] = "spec/nodes.md#references";
-constexpr char kTop[] = "spec/parts.md#parts-top";
 
 /// Every interior child is a group that exists: who follows a reference has only to check that
 /// levels increase.
@@ -25,7 +25,7 @@ void verify_references(const NodePage& nodes, const PageRules& rules) {
     for (unsigned rest = group.interior_mask(); rest != 0; rest &= rest - 1) {
       const ChildRef child = group.child(std::countr_zero(rest));
       if (child.slot < rules.node_pages[child.page].record_count) continue;
-      throw FormatError(0, child.page < rules.own_pages ? kReferences : kTop,
+      throw FormatError(0, child.page < rules.own_pages ? kReferences : clause::kPartsTop,
                         "group " + std::to_string(slot) + " refers to group " +
                             std::to_string(child.slot) + " of node page " +
                             std::to_string(child.page) + ", which there is not");

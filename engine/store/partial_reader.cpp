@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/store/clauses.h"
 #include "engine/store/commit.h"
 #include "engine/store/structure.h"
 #include "format/checksum.h"
@@ -13,11 +14,6 @@
 
 namespace ptc {
 namespace {
-
-constexpr char kMagic[] = "spec/container.md#superblock-magic";
-constexpr char kLength[] = "spec/container.md#superblock-length";
-constexpr char kListing[] = "spec/container.md#directory-listing";
-constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 // A request costs about as much as the transfer of this many bytes: 2 ms at 16 MB/s.
 constexpr std::uint64_t kGapBytes = std::uint64_t{32} << 10;
@@ -56,9 +52,11 @@ PartialReader::PartialReader(RangeSource& source) : source_(source) {
 void PartialReader::open() {
   end_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(source_.size(), kFirstRequest)));
   if (end_.size() < 2 * kBlockBytes)
-    throw FormatError(0, kMagic, "the file is too short").rebased(0, source_.name());
+    throw FormatError(0, clause::kSuperblockMagic, "the file is too short")
+        .rebased(0, source_.name());
   if (source_.size() % kBlockBytes != 0) {
-    throw FormatError(source_.size(), kLength, "the file is no multiple of 4096 bytes long")
+    throw FormatError(source_.size(), clause::kSuperblockLength,
+                      "the file is no multiple of 4096 bytes long")
         .rebased(0, source_.name());
   }
   source_.read(source_.size() - end_.size(), end_);
@@ -84,7 +82,7 @@ void PartialReader::read_meta() {
   columns_ = columns_by_group(meta_);
   std::vector<std::uint8_t> groups = channel_groups(meta_.channels);
   if (groups.size() != superblock_.attribute_groups) {
-    throw FormatError(entries_.at(page).offset, kAttributePages,
+    throw FormatError(entries_.at(page).offset, clause::kAttributePages,
                       "the schema has another number of groups than the superblock")
         .rebased(0, source_.name());
   }
@@ -103,21 +101,22 @@ void PartialReader::check_entry(std::uint32_t page, const DirectoryEntry& entry)
                                                     : PageType::attribute;
   const bool parts = entry.type == PageType::parts && header().has_parts();
   const bool fits = other ? parts || is_skippable(entry.type) : entry.type == wanted;
-  if (!fits) throw FormatError(0, kListing, "an entry is of another type than its place");
+  if (!fits)
+    throw FormatError(0, clause::kDirectoryListing, "an entry is of another type than its place");
   if (!point && wanted != PageType::attribute) return;
   const std::uint32_t rank = page % superblock_.point_pages;
   const std::uint64_t full = points_per_page(header());
   const std::uint64_t left = superblock_.points - std::min(superblock_.points, rank * full);
   if (entry.record_count != std::min(full, left)) {
-    throw FormatError(0, point ? "spec/points.md#point-pages" : kAttributePages,
+    throw FormatError(0, point ? "spec/points.md#point-pages" : clause::kAttributePages,
                       "an entry has another number of points than its place");
   }
   if (point || numbers_.groups().empty()) return;
   if (entry.group != numbers_.groups()[page / superblock_.point_pages - 1])
-    throw FormatError(0, kAttributePages, "an entry is of another group than its place");
+    throw FormatError(0, clause::kAttributePages, "an entry is of another group than its place");
   const std::size_t bytes = entry.record_count * group_point_bytes(meta_.channels, entry.group);
   if (!entry.is_void() && entry.raw_bytes != bytes)
-    throw FormatError(0, kAttributePages, "the page is not as long as its channels are");
+    throw FormatError(0, clause::kAttributePages, "the page is not as long as its channels are");
 }
 
 std::vector<PartialReader::Extent> PartialReader::merged(std::vector<Extent> extents,

@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "engine/io/file/url.h"
+#include "engine/store/clauses.h"
 #include "engine/store/commit.h"
 #include "engine/store/reader.h"
 #include "format/error.h"
@@ -22,8 +23,6 @@ namespace {
 constexpr char kParts[] = "spec/parts.md#parts-page";
 constexpr char kCount[] = "spec/parts.md#parts-count";
 constexpr char kFile[] = "spec/parts.md#parts-file";
-constexpr char kTop[] = "spec/parts.md#parts-top";
-constexpr char kCounts[] = "spec/container.md#superblock-counts";
 
 /// Returns how a part's file differs from what the scene says of it; empty when it does not.
 std::string difference(const ContainerReader& scene, const PartRecord& record,
@@ -71,7 +70,7 @@ void ContainerReader::open_parts() {
   for (const std::uint32_t page : node_pages()) groups += entries_[page].record_count;
   for (const auto& part : parts_) groups += part->superblock().node_groups;
   if (superblock_.node_groups != groups) {
-    throw FormatError(superblock_.file_bytes - 2 * kBlockBytes, kCounts,
+    throw FormatError(superblock_.file_bytes - 2 * kBlockBytes, clause::kSuperblockCounts,
                       "superblock says " + std::to_string(superblock_.node_groups) +
                           " node groups, the scene and its parts have " + std::to_string(groups))
         .rebased(0, path().string());
@@ -233,7 +232,7 @@ void ContainerReader::renumber_top(std::span<std::byte> payload, std::uint32_t g
         std::ranges::upper_bound(places_, ref.first_point, {}, &PartPlace::first_point);
     const PartPlace& place = *(behind - 1);
     if (behind == places_.end() || ref.first_point + ref.point_count > behind->first_point)
-      throw FormatError(0, kTop, "a leaf has points of two parts");
+      throw FormatError(0, clause::kPartsTop, "a leaf has points of two parts");
     ref.first_point += place.first_number - place.first_point;
     return ref;
   });

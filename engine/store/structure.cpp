@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/store/clauses.h"
 #include "format/error.h"
 #include "format/node_page.h"
 #include "format/point_page.h"
@@ -15,15 +16,12 @@
 namespace ptc {
 namespace {
 
-constexpr char kListing[] = "spec/container.md#directory-listing";
 constexpr char kTail[] = "spec/container.md#tail-pages";
 constexpr char kOverlap[] = "spec/container.md#directory-overlap";
 constexpr char kMeta[] = "spec/container.md#meta-page";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
-constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kDigest[] = "spec/container.md#superblock-digest";
 constexpr char kPointPages[] = "spec/points.md#point-pages";
-constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 /// Throws errors with the place in the file of the entry or superblock at fault.
 class Blame {
@@ -73,14 +71,16 @@ void verify_listing(const Superblock& superblock, std::span<const DirectoryEntry
       const bool parts = entry.type == PageType::parts && superblock.header.has_parts();
       const bool ordered = page == places.others().first || entries[page - 1].type <= entry.type;
       if ((parts || is_skippable(entry.type)) && ordered) continue;
-      blame.entry(page, kListing, "has no place behind the node pages");
+      blame.entry(page, clause::kDirectoryListing, "has no place behind the node pages");
     } else if (page % superblock.point_pages != 0) {
       least = entries[page - 1].group;  // the group of the page before it
-      if (entry.group != least) blame.entry(page, kListing, "is of another group than its place");
+      if (entry.group != least)
+        blame.entry(page, clause::kDirectoryListing, "is of another group than its place");
     } else if (page > superblock.point_pages && entry.group <= entries[page - 1].group) {
-      blame.entry(page, kListing, "begins a group that does not ascend");
+      blame.entry(page, clause::kDirectoryListing, "begins a group that does not ascend");
     }
-    if (entry.type != wanted) blame.entry(page, kListing, "is of another type than its place");
+    if (entry.type != wanted)
+      blame.entry(page, clause::kDirectoryListing, "is of another type than its place");
   }
 }
 
@@ -126,8 +126,9 @@ void verify_counts(const Superblock& superblock, std::span<const DirectoryEntry>
                    const Blame& blame) {
   const auto same = [&](const char* what, std::uint64_t said, std::uint64_t found) {
     if (said == found) return;
-    blame.superblock(kCounts, "superblock says " + std::to_string(said) + " " + what +
-                                  ", the directory has " + std::to_string(found));
+    blame.superblock(clause::kSuperblockCounts, "superblock says " + std::to_string(said) + " " +
+                                                    what + ", the directory has " +
+                                                    std::to_string(found));
   };
   const PageNumbers places = places_of(superblock);
   // Points and groups of a scene of parts are compared once its parts are open.
@@ -136,8 +137,9 @@ void verify_counts(const Superblock& superblock, std::span<const DirectoryEntry>
     same("node groups", superblock.node_groups, count_records(entries, places.nodes()));
   }
   if (superblock.nodes > superblock.node_groups * kMaxChildren) {
-    blame.superblock(kCounts, "superblock says " + std::to_string(superblock.nodes) + " nodes in " +
-                                  std::to_string(superblock.node_groups) + " groups");
+    blame.superblock(clause::kSuperblockCounts,
+                     "superblock says " + std::to_string(superblock.nodes) + " nodes in " +
+                         std::to_string(superblock.node_groups) + " groups");
   }
 }
 
@@ -175,12 +177,12 @@ void verify_group(std::span<const DirectoryEntry> entries, const PageNumbers::Ra
     const DirectoryEntry& entry = entries[pages[rank]];
     const std::uint32_t count = entries[rank].record_count;
     if (entry.record_count != count) {
-      blame.entry(pages[rank], kAttributePages,
+      blame.entry(pages[rank], clause::kAttributePages,
                   "has attributes of " + std::to_string(entry.record_count) +
                       " points, its point page has " + std::to_string(count));
     }
     if (!entry.is_void() && entry.raw_bytes != std::uint64_t{count} * point_bytes) {
-      blame.entry(pages[rank], kAttributePages, "is not as long as its channels are");
+      blame.entry(pages[rank], clause::kAttributePages, "is not as long as its channels are");
     }
   }
 }
@@ -238,7 +240,7 @@ void verify_attributes(const Superblock& superblock, std::span<const DirectoryEn
   const Blame blame(superblock);
   const std::vector<std::uint8_t> groups = channel_groups(meta.channels);
   if (groups.size() != superblock.attribute_groups) {
-    blame.superblock(kAttributePages,
+    blame.superblock(clause::kAttributePages,
                      "the superblock counts " + std::to_string(superblock.attribute_groups) +
                          " channel groups, the meta page has " + std::to_string(groups.size()));
   }
@@ -246,7 +248,7 @@ void verify_attributes(const Superblock& superblock, std::span<const DirectoryEn
   for (const std::uint8_t group : groups) {
     const PageNumbers::Range pages = numbers.attributes(group);
     if (!pages.empty() && entries[pages.first].group != group) {
-      blame.entry(pages.first, kAttributePages,
+      blame.entry(pages.first, clause::kAttributePages,
                   "is of channel group " + std::to_string(entries[pages.first].group) +
                       " where the meta page has " + std::to_string(group));
     }

@@ -13,13 +13,13 @@
 
 #include <fmt/format.h>
 
+#include "engine/store/clauses.h"
 #include "format/point_page.h"
 
 namespace ptc {
 namespace {
 
 constexpr char kOrder[] = "spec/points.md#point-order";
-constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kTotals[] = "spec/container.md#superblock-totals";
 
 constexpr double kRelative = 1e-6;  // what another order of summation may change in a total
@@ -179,7 +179,7 @@ void PointRuns::compare() {
   add_up();
   const Superblock& s = container_.superblock();
   if (totals_.taken != s.points)
-    report_.superblock(kCounts,
+    report_.superblock(clause::kSuperblockCounts,
                        fmt::format("the leaves hold {} of the {} points", totals_.taken, s.points));
   compare("area", s.area, totals_.area);
   for (std::size_t c = 0; c < 3; ++c) compare("flux", s.flux[c], totals_.flux[c]);

@@ -15,6 +15,7 @@
 
 #include <fmt/format.h>
 
+#include "engine/store/clauses.h"
 #include "engine/verify/checked_pages.h"
 #include "format/bytes.h"
 #include "format/checksum.h"
@@ -24,7 +25,6 @@ namespace {
 
 constexpr char kPayload[] = "spec/container.md#page-payload";
 constexpr char kAgreement[] = "spec/container.md#page-agreement";
-constexpr char kAttributePages[] = "spec/points.md#attribute-pages";
 
 constexpr std::size_t kPayloadHashAt = 48;  // offset of the payload's checksum in the page header
 
@@ -179,7 +179,7 @@ void SurveyedPage::check_channels() const {
   if (header_.raw_bytes ==
       header_.record_count * group_point_bytes(survey_.meta.channels, header_.group))
     return;
-  throw FormatError(16, kAttributePages,
+  throw FormatError(16, clause::kAttributePages,
                     "the payload does not have the size that its channels need");
 }
 

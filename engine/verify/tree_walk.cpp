@@ -12,19 +12,18 @@
 
 #include "engine/octree/octree.h"
 #include "engine/octree/summary.h"
+#include "engine/store/clauses.h"
 #include "engine/verify/verify_node.h"
 
 namespace ptc {
 namespace {
 
-constexpr char kTop[] = "spec/parts.md#parts-top";
 constexpr char kLevel[] = "spec/nodes.md#node-level";
 constexpr char kCell[] = "spec/nodes.md#node-cell";
 constexpr char kChildren[] = "spec/nodes.md#node-children";
 constexpr char kLeaf[] = "spec/nodes.md#node-leaf";
 constexpr char kEmissionRule[] = "spec/nodes.md#node-emission";
 constexpr char kReferences[] = "spec/nodes.md#references";
-constexpr char kCounts[] = "spec/container.md#superblock-counts";
 constexpr char kRoot[] = "spec/container.md#superblock-root";
 
 bool contains(const NodeGroup& group, const MortonKey& key) {
@@ -147,8 +146,8 @@ TreeCounts TreeWalk::finish() {
   if (!counts_.complete) return counts_;
   reached_.report_rest(report_);
   points_.compare();
-  require_equal(kCounts, "nodes", superblock_.nodes, counts_.nodes);
-  require_equal(kCounts, "node groups", superblock_.node_groups, counts_.groups);
+  require_equal(clause::kSuperblockCounts, "nodes", superblock_.nodes, counts_.nodes);
+  require_equal(clause::kSuperblockCounts, "node groups", superblock_.node_groups, counts_.groups);
   require_equal(kRoot, "levels", superblock_.levels, static_cast<std::uint64_t>(counts_.levels));
   return counts_;
 }
@@ -197,8 +196,8 @@ void TreeWalk::require_equal(const char* clause, const char* what, std::uint64_t
 void TreeWalk::fault(const OpenGroup& open, const char* clause, const std::string& text) const {
   const std::string place = (open.raw ? "" : fmt::format("decoded byte {}: ", open.at)) +
                             fmt::format("group {}: ", open.slot);
-  report_.page(open.page, kPageHeaderBytes + (open.raw ? open.at : 0), at_seam_ ? kTop : clause,
-               place + text);
+  report_.page(open.page, kPageHeaderBytes + (open.raw ? open.at : 0),
+               at_seam_ ? clause::kPartsTop : clause, place + text);
 }
 
 /// Says whether what hangs below a group is a seam: the group is of the top of a scene of parts.

@@ -95,7 +95,7 @@ Vec3 sum_of_normals(const NodeSummary& node) {
 
 /// Returns the unit normal of the slab, which is the direction of the summed facing areas; zero
 /// where they cancel out.
-Vec3 slab_normal(const NodeSummary& node) {
+Vec3 normal_of_slab(const NodeSummary& node) {
   Vec3 sum = sum_of_normals(node);
   const double norm = length(sum);
   if (!(norm > 0)) return {};
@@ -105,7 +105,7 @@ Vec3 slab_normal(const NodeSummary& node) {
 
 std::optional<Fault> compare_slab(const NodeSummary& stored, const NodeSummary& exact) {
   const double moved = distance(stored.mean, exact.mean);
-  const double turned = distance(slab_normal(stored), slab_normal(exact));
+  const double turned = distance(normal_of_slab(stored), normal_of_slab(exact));
   const double widest = exact.radius + moved;
   const double needed = std::min(exact.thickness + exact.radius * turned + moved, widest);
   const double slack = kLatticeSlack + kRelative * widest;
@@ -235,7 +235,7 @@ std::optional<Fault> check_bounds(const NodeSummary& stored, const PointColumns&
   const double axis_length = length(axis);
   const double radius = stored.radius * (1 + kRelative) + kLatticeSlack;
   const double thickness = stored.thickness + kRelative * stored.radius + kLatticeSlack;
-  const ReachFrom from{stored.mean, slab_normal(stored), stored.cone_axis};
+  const ReachFrom from{stored.mean, normal_of_slab(stored), stored.cone_axis};
   // Returns the bound that some of the discs reach beyond.
   enum class Bound { none, sphere, slab, cone };
   const auto broken_by = [&](const Reach& reach) {

@@ -25,7 +25,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kMaxCachedPages = 64;
+constexpr std::size_t kMaxTreePages = 64;
 constexpr std::size_t kMinCachedPages = 8;
 constexpr std::uint64_t kSubtreePages = 16;  // a subtree has no more points than these pages
 constexpr std::size_t kSubtreesAtOnce = 64;  // of a round, for each walk
@@ -231,9 +231,8 @@ TreeMemory TreeMemory::divided(std::uint64_t bytes, const Superblock& superblock
   const auto walks = static_cast<unsigned>(std::min({fit, useful, std::uint64_t{threads}}));
   const std::uint64_t pages =
       (bytes / (walks + 1) - walk_bytes(superblock)) >> superblock.header.page_shift;
-  return {
-      .walks = walks,
-      .cached_pages = static_cast<std::size_t>(std::min<std::uint64_t>(pages, kMaxCachedPages))};
+  return {.walks = walks,
+          .cached_pages = static_cast<std::size_t>(std::min<std::uint64_t>(pages, kMaxTreePages))};
 }
 
 CheckedTree verify_tree(const ContainerReader& container, const std::vector<bool>& damaged,

@@ -6,6 +6,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
+#include "tests/support/slurp.h"
 #include "tools/bench/experiments/accuracy.h"
 #include "tools/bench/experiments/accuracy_chart.h"
 
@@ -59,12 +60,6 @@ SceneAccuracy accuracy() {
     }
   }
   return scene;
-}
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
 }
 
 /// Returns the cells of each line of a CSV file (RFC 4180).
@@ -158,8 +153,8 @@ TEST_CASE("reports: the files hold the facts, and each line of the table has eve
   const std::vector<SceneAccuracy> scenes{accuracy(), plain};
   write_files(dir.path(), report_of(scenes, 5));
   const nlohmann::ordered_json facts = facts_of(report_of(scenes, 5));
-  CHECK(nlohmann::ordered_json::parse(text_of(dir / "accuracy.json")) == facts);
-  const auto lines = csv_cells(text_of(dir / "accuracy.csv"));
+  CHECK(nlohmann::ordered_json::parse(slurp(dir / "accuracy.json")) == facts);
+  const auto lines = csv_cells(slurp(dir / "accuracy.csv"));
   REQUIRE(lines.size() == 1 + facts.at("rows").size());
   for (std::size_t i = 1; i < lines.size(); ++i) {
     REQUIRE(lines[i].size() == lines[0].size());
@@ -171,8 +166,8 @@ TEST_CASE("reports: the files hold the facts, and each line of the table has eve
     }
   }
   for (const char* name : {"accuracy", "accuracy-rooms", "accuracy-two, \"rooms\""}) {
-    CHECK(text_of(dir / (std::string(name) + ".svg")).find("<svg") != std::string::npos);
-    CHECK(text_of(dir / (std::string(name) + ".png")).starts_with("\x89PNG"));
+    CHECK(slurp(dir / (std::string(name) + ".svg")).find("<svg") != std::string::npos);
+    CHECK(slurp(dir / (std::string(name) + ".png")).starts_with("\x89PNG"));
   }
 }
 

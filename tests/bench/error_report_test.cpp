@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
+#include "tests/support/slurp.h"
 #include "tools/bench/experiments/error_knob.h"
 
 using namespace ptc;
@@ -43,12 +44,6 @@ SceneErrors errors(bool mesh) {
   return scene;
 }
 
-std::string text_of(const std::filesystem::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
-}
-
 }  // namespace
 
 TEST_CASE("error report: the slope is the exponent of the error as a power of time",
@@ -83,10 +78,10 @@ TEST_CASE("error report: an unreachable error counts as not met, and every file 
   CHECK_THAT(text, Catch::Contains("power") && Catch::Contains("-2.00"));
   const test::TemporaryDirectory dir;
   write_files(dir.path(), report_of(scenes));
-  CHECK(nlohmann::ordered_json::parse(text_of(dir / "error.json")) == facts_of(report_of(scenes)));
-  const std::string rows = text_of(dir / "error.csv"), rungs = text_of(dir / "error-ladder.csv");
+  CHECK(nlohmann::ordered_json::parse(slurp(dir / "error.json")) == facts_of(report_of(scenes)));
+  const std::string rows = slurp(dir / "error.csv"), rungs = slurp(dir / "error-ladder.csv");
   CHECK(std::ranges::count(rows, '\n') == 3);
   CHECK(std::ranges::count(rungs, '\n') == static_cast<std::ptrdiff_t>(ladder().size()) + 1);
-  CHECK(text_of(dir / "error.svg").find("room, points") != std::string::npos);
+  CHECK(slurp(dir / "error.svg").find("room, points") != std::string::npos);
   CHECK(std::filesystem::file_size(dir / "error.png") > 1000);
 }

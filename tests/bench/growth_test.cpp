@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-GrowthOptions small() {
+GrowthOptions small_growth() {
   GrowthOptions options;
   options.points = {10'000, 30'000};
   options.middle_points = 8'000;
@@ -71,7 +71,7 @@ std::vector<GrowthRow> all_rows() {
 
 TEST_CASE("growth: there is a checked row for each number of surfels, next to one of Embree",
           "[bench][growth]") {
-  const std::vector<GrowthRow> rows = measure(small(), "surfels");
+  const std::vector<GrowthRow> rows = measure(small_growth(), "surfels");
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].x == Approx(10'000).epsilon(0.06));
   CHECK(rows[1].x == Approx(30'000).epsilon(0.06));
@@ -87,7 +87,7 @@ TEST_CASE("growth: there is a checked row for each number of surfels, next to on
 }
 
 TEST_CASE("growth: where rays are too slow there is a time and no error", "[bench][growth]") {
-  GrowthOptions options = small();
+  GrowthOptions options = small_growth();
   options.ray_reach = 20'000;
   const std::vector<GrowthRow> rows = measure(options, "surfels");
   REQUIRE(rows.size() == 2);
@@ -100,7 +100,7 @@ TEST_CASE("growth: where rays are too slow there is a time and no error", "[benc
 }
 
 TEST_CASE("growth: a smaller solid angle has a smaller error", "[bench][growth]") {
-  const std::vector<GrowthRow> rows = measure(small(), "solid-angle");
+  const std::vector<GrowthRow> rows = measure(small_growth(), "solid-angle");
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].x == Approx(0.3));
   CHECK(rows[1].x == Approx(0.003));
@@ -108,7 +108,7 @@ TEST_CASE("growth: a smaller solid angle has a smaller error", "[bench][growth]"
 }
 
 TEST_CASE("growth: sheets lie behind each other", "[bench][growth]") {
-  const std::vector<GrowthRow> rows = measure(small(), "depth");
+  const std::vector<GrowthRow> rows = measure(small_growth(), "depth");
   REQUIRE(rows.size() == 2);
   CHECK(rows[0].x == 1);
   CHECK(rows[1].x == 8);
@@ -116,7 +116,7 @@ TEST_CASE("growth: sheets lie behind each other", "[bench][growth]") {
 }
 
 TEST_CASE("growth: a cap changes how much is read and no result", "[bench][growth]") {
-  GrowthOptions options = small();
+  GrowthOptions options = small_growth();
   options.points = {100'000};
   options.own_points = 16'384;
   const std::vector<GrowthRow> rows = measure(options, "cap", 2);
@@ -136,7 +136,7 @@ TEST_CASE("growth: a cap changes how much is read and no result", "[bench][growt
 
 TEST_CASE("growth: a disk with too little room is refused before anything is built",
           "[bench][growth]") {
-  GrowthOptions options = small();
+  GrowthOptions options = small_growth();
   options.points = {std::uint64_t{1} << 46};
   const test::TemporaryDirectory dir;
   Progress silent;

@@ -19,7 +19,7 @@ using namespace ptc::bench;
 
 namespace {
 
-ModelOptions small() {
+ModelOptions small_model() {
   ModelOptions options;
   options.scene.points = 8'000;
   options.scene.shaded_width = 64;
@@ -41,8 +41,9 @@ const SceneModel& measured() {
     const test::TemporaryDirectory dir;
     Progress silent;
     const ThreadPool executor(1);
-    const BenchScene scene({.name = "fractal"}, small().scene, dir.path(), {.threads = 1}, silent);
-    SceneModel found = measure_model(scene, small(), dir.path(), executor, silent);
+    const BenchScene scene({.name = "fractal"}, small_model().scene, dir.path(), {.threads = 1},
+                           silent);
+    SceneModel found = measure_model(scene, small_model(), dir.path(), executor, silent);
     CHECK(std::filesystem::is_empty(dir.path()));
     return found;
   }();
@@ -137,7 +138,7 @@ TEST_CASE("model: stored nodes give the shading of the plain gather", "[bench][m
   const test::TemporaryDirectory dir;
   Progress silent;
   const ThreadPool executor(1);
-  ModelOptions options = small();
+  ModelOptions options = small_model();
   options.solid_angles = {0.05F};
   const BenchScene scene({.name = "city"}, options.scene, dir.path(), {.threads = 1}, silent);
   std::vector<Receiver> receivers(scene.sets().front().receivers);
@@ -165,7 +166,7 @@ TEST_CASE("model: stored nodes give the shading of the plain gather", "[bench][m
 TEST_CASE("model: a camera that sees nothing is refused", "[bench][model]") {
   const test::TemporaryDirectory dir;
   Progress silent;
-  ModelOptions options = small();
+  ModelOptions options = small_model();
   options.scene.shaded_width = 0;
   options.scene.own_points = 0;
   const BenchScene scene({.name = "city"}, options.scene, dir.path(), {.threads = 1}, silent);

@@ -42,13 +42,13 @@ std::vector<Receiver> floor_receivers() {
   return receivers;
 }
 
-struct Compared {
+struct Difference {
   ErrorStatistics occlusion, irradiance;  // relative to their means
 };
 
 /// @param ours, theirs  return the result of a receiver, given the receiver and its index
 template <class Ours, class Theirs>
-Compared compare(const std::vector<Receiver>& receivers, const Ours& ours, const Theirs& theirs) {
+Difference compare(const std::vector<Receiver>& receivers, const Ours& ours, const Theirs& theirs) {
   std::vector<float> a, b, light_a, light_b;
   for (std::size_t i = 0; i < receivers.size(); ++i) {
     const Shading one = ours(receivers[i], i), other = theirs(receivers[i], i);
@@ -75,7 +75,7 @@ TEST_CASE("ray baseline: discs give the results of the oracle, with both sides a
   for (const Sides sides : {Sides::both, Sides::front}) {
     const RayBaseline rays(surfels, sides);
     const DiscRays oracle(surfels, sides, {});
-    const Compared errors =
+    const Difference errors =
         compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 8192),
                 [&](const Receiver& receiver, std::size_t i) {
                   return oracle.trace(receiver, 8100, 5000 + i);
@@ -105,7 +105,7 @@ TEST_CASE("ray baseline: a mesh gives the results of its surfels as discs", "[be
   std::erase_if(receivers,
                 [](const Receiver& r) { return r.position.y > 61.3; });  // not behind the wall
   const RayBaseline discs(surfels, Sides::both), triangles(mesh, surfels, kSpacing);
-  const Compared errors =
+  const Difference errors =
       compare(receivers, trace_with(triangles, Job::bleeding, Packets::sixteen, 4096),
               trace_with(discs, Job::bleeding, Packets::sixteen, 4096));
   CHECK(errors.irradiance.reference_mean > 0.05);
@@ -136,8 +136,9 @@ TEST_CASE("ray baseline: single rays and packets with one seed differ only in ti
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   for (const Job job : {Job::occlusion, Job::bleeding}) {
-    const Compared errors = compare(floor_receivers(), trace_with(rays, job, Packets::single, 1024),
-                                    trace_with(rays, job, Packets::sixteen, 1024));
+    const Difference errors =
+        compare(floor_receivers(), trace_with(rays, job, Packets::single, 1024),
+                trace_with(rays, job, Packets::sixteen, 1024));
     CHECK(errors.occlusion.rms < 1e-3);
     if (job == Job::bleeding) CHECK(errors.irradiance.rms < 2e-3);
   }
@@ -160,9 +161,9 @@ TEST_CASE("ray baseline: errors fall faster than one over the root of the rays",
   const std::vector<Surfel> surfels = balls_before_a_wall();
   const RayBaseline rays(surfels, Sides::both);
   const auto truth = trace_with(rays, Job::bleeding, Packets::sixteen, 65536, 1'000'000);
-  const Compared few =
+  const Difference few =
       compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 128), truth);
-  const Compared many =
+  const Difference many =
       compare(floor_receivers(), trace_with(rays, Job::bleeding, Packets::sixteen, 1024), truth);
   const double root = std::sqrt(1024.0 / 128);
   CHECK(few.occlusion.rms > 1.2 * root * many.occlusion.rms);

@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "tests/support/scenes.h"
+#include "tests/support/slurp.h"
 
 using namespace ptc;
 using namespace ptc::bench;
@@ -41,12 +42,6 @@ Circumstances circumstances(bool changed) {
           .changed = changed,
           .date = "2025-01-31 12:00",
           .command = "ptcbench sample -o charts"};
-}
-
-std::string text_of(const std::filesystem::path& path) {
-  std::ostringstream text;
-  text << std::ifstream(path).rdbuf();
-  return text.str();
 }
 
 std::string command_of(std::vector<std::string> words) {
@@ -115,9 +110,9 @@ TEST_CASE("results: the file and its charts are written whole, even over an olde
   const test::TemporaryDirectory dir;
   std::ofstream(dir / "sample.md") << "older";
   write_results(dir.path(), report(5), circumstances(false));
-  CHECK(text_of(dir / "sample.md") == results_text(report(5), circumstances(false)));
-  CHECK_THAT(text_of(dir / "sample-city.svg"), Catch::Contains("</svg>"));
-  CHECK(text_of(dir / "sample-city.png").starts_with("\x89PNG"));
+  CHECK(slurp(dir / "sample.md") == results_text(report(5), circumstances(false)));
+  CHECK_THAT(slurp(dir / "sample-city.svg"), Catch::Contains("</svg>"));
+  CHECK(slurp(dir / "sample-city.png").starts_with("\x89PNG"));
   std::size_t files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(dir.path())) {
     static_cast<void>(entry);
@@ -131,7 +126,7 @@ TEST_CASE("results: pictures are written beside the text, which shows them", "[b
   Report seen = report(5);
   seen.sheets = {{.part = "room", .caption = "A room.", .image = {2, 1, {{1, 0, 0}, {0, 1, 0}}}}};
   write_results(dir.path(), seen, circumstances(false));
-  CHECK_THAT(text_of(dir / "sample.md"),
+  CHECK_THAT(slurp(dir / "sample.md"),
              Catch::Contains("\nA room.\n\n![A room.](sample-room.png)\n"));
   const Image image = read_image(dir / "sample-room.png");
   REQUIRE(image.width == 2);

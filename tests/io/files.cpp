@@ -10,11 +10,6 @@
 
 namespace ptc {
 
-std::string slurp(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 std::string tga_with_alpha(const std::vector<std::uint8_t>& alpha) {
   std::string bytes(12, '\0');
   bytes[2] = 2;  // true colour, not compressed

@@ -11,11 +11,10 @@
 #include <string_view>
 #include <vector>
 
+#include "tests/support/slurp.h"
 #include "tests/support/temporary_directory.h"
 
 namespace ptc {
-
-[[nodiscard]] std::string slurp(const std::filesystem::path& path);
 
 /// Returns the bytes of a value as they lie in memory, for binary files.
 template <typename T>

@@ -110,7 +110,7 @@ TEST_CASE("light rig: an empty object is a rig without lights", "[scene][lights]
 
 TEST_CASE("light rig: without spot lights it has the text that versions before them read",
           "[scene][lights]") {
-  CHECK(to_json({}) ==
+  CHECK(to_json(LightRig{}) ==
         R"({"points":[],"sky":{"radiance":[0.0,0.0,0.0],"up":[0.0,1.0,0.0]},"suns":[]})");
 }
 

@@ -26,7 +26,7 @@ Camera overhead(double height) {
   return camera;
 }
 
-std::vector<Surfel> sample(const Mesh& mesh, const SamplingOptions& options) {
+std::vector<Surfel> sample_view(const Mesh& mesh, const SamplingOptions& options) {
   const RayScene scene(mesh);
   const DirectLight light(scene, {});
   const ThreadPool executor(2);
@@ -78,7 +78,7 @@ TEST_CASE("sampler: near a camera surfels are as close as its pixels and cover a
   options.spacing = 0.25;
   options.camera = overhead(8);  // pixels of 0.068 on the ground below
   options.pixels_per_surfel = 1;
-  const auto surfels = sample(mesh, options);
+  const auto surfels = sample_view(mesh, options);
   const double fine = 8 * static_cast<double>(options.camera->pixel_angle());
   int in_view = 0;
   for (const Surfel& s : surfels) {
@@ -101,11 +101,11 @@ TEST_CASE("sampler: a camera that sees nothing changes nothing", "[scene][sample
   const Mesh mesh = ground(1);
   SamplingOptions options;
   options.count = 1000;
-  const auto without = sample(mesh, options);
+  const auto without = sample_view(mesh, options);
   options.camera = overhead(5);
   options.camera->look_at = {0, 50, 0};
   options.camera->up = {1, 0, 0};
-  const auto with = sample(mesh, options);
+  const auto with = sample_view(mesh, options);
   REQUIRE(with.size() == without.size());
   for (std::size_t i = 0; i < with.size(); ++i) CHECK(with[i].position == without[i].position);
 }
@@ -120,7 +120,7 @@ TEST_CASE("sampler: a camera on the surface makes nothing finer than the finest 
   options.camera->position = {0, 0, 0};
   options.camera->look_at = {1, 0, 0};
   options.camera->up = {0, 1, 0};
-  const auto surfels = sample(mesh, options);
+  const auto surfels = sample_view(mesh, options);
   CHECK(surfels.size() > 400);
   CHECK(surfels.size() < 6400);
   CHECK(covered_area(surfels) == Approx(4).epsilon(1e-6));

@@ -46,6 +46,19 @@ if(PTC_SANITIZE)
   target_link_options(ptc_options INTERFACE -fsanitize=${PTC_SANITIZE})
 endif()
 
+# ptc_compile_together(<target> <number>) compiles files in groups of that number: most of the time of each went to
+# headers and templates that all of them need. Only for Release: the other presets compile each file alone, and find
+# what one includes too little. Kernels, which include themselves once for each instruction set, and experiments, whose
+# tables have the same names, stay alone.
+function(ptc_compile_together target number)
+  if(CMAKE_BUILD_TYPE STREQUAL "Release")
+    get_target_property(alone ${target} SOURCES)
+    list(FILTER alone INCLUDE REGEX "kernels|_experiment\\.cpp$")
+    set_source_files_properties(${alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${number})
+  endif()
+endfunction()
+
 # ptc_add_layer(<path> SOURCES <files> HEADERS <files> [PUBLIC <libs>] [PRIVATE <libs>])
 # makes the static library ptc_<name> with the alias ptc::<name>; its headers are included as "<path>/x.h".
 function(ptc_add_layer path)
@@ -55,8 +68,8 @@ function(ptc_add_layer path)
   add_library(ptc::${name} ALIAS ptc_${name})
   target_sources(ptc_${name} PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR}
     FILES ${ARG_HEADERS})
-  # A source begins with the header of its name, which is thereby compiled alone (tests/layers.py); the check
-  # compiles the others.
+  # A source begins with the header of its name, which is thereby compiled alone (tests/layers.py) wherever sources are
+  # not compiled together; the check compiles the others.
   set(alone ${ARG_HEADERS})
   foreach(source IN LISTS ARG_SOURCES)
     string(REGEX REPLACE "\\.cpp$" ".h" header ${source})
@@ -67,6 +80,9 @@ function(ptc_add_layer path)
     set_target_properties(ptc_${name} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON INTERFACE_HEADER_SETS_TO_VERIFY alone)
   endif()
   target_link_libraries(ptc_${name} PUBLIC ptc_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+  if(NOT name MATCHES "^(format|stability)$")  # constants of their files have the same names
+    ptc_compile_together(ptc_${name} 8)
+  endif()
   foreach(layer IN LISTS PTC_LAYERS_${path})
     get_filename_component(dependency ${layer} NAME)
     target_link_libraries(ptc_${name} PUBLIC ptc::${dependency})
@@ -97,12 +113,6 @@ function(ptc_compile_quickly target)
   ptc_read_once(${target} ${ARGN})
 endfunction()
 
-# ptc_compile_together(<target>) compiles files in groups: each would instantiate the same templates of CLI11 and JSON,
-# which takes longer than the file's own code.
-function(ptc_compile_together target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
-endfunction()
-
 # ptc_add_tests(<name> SOURCES <files> LINK <libs>) makes the executable test_<name> and registers each of its
 # TEST_CASEs with ctest. Those of the format come first and read Catch2 for all.
 function(ptc_add_tests name)
@@ -115,6 +125,9 @@ function(ptc_add_tests name)
     ptc_compile_quickly(test_format PRIVATE ${PTC_READ_OFTEN} <catch2/catch.hpp>)
   else()
     ptc_compile_quickly(test_${name} REUSE_FROM test_format)
+  endif()
+  if(name MATCHES "^(bench|integration|scene|shade|trace)$")  # others gain nothing by it
+    ptc_compile_together(test_${name} 4)
   endif()
   catch_discover_tests(test_${name} TEST_PREFIX "${name}: " PROPERTIES TIMEOUT 300)
 endfunction()

@@ -27,7 +27,7 @@ namespace ptc {
 namespace {
 
 constexpr std::uint64_t kHeaderBytes = 60;
-constexpr std::uint32_t kMagic = 670;
+constexpr std::uint32_t kPdbMagic = 670;
 constexpr std::uint32_t kChannelMagic = 128611;
 constexpr std::size_t kNameOffset = 42;
 constexpr std::size_t kMaxName = 256;
@@ -46,7 +46,7 @@ class PdbSource : public ColumnSource {
     // Read the header.
     std::array<std::byte, kHeaderBytes> begin{};
     read(0, begin, "the header ends too early");
-    if (load<std::uint32_t>(begin.data(), 0) != kMagic) fail(0, "not a PDB file of Maya");
+    if (load<std::uint32_t>(begin.data(), 0) != kPdbMagic) fail(0, "not a PDB file of Maya");
     count_ = load<std::uint32_t>(begin.data(), 16);
     const auto channels = load<std::uint32_t>(begin.data(), 20);
     if (channels > kMaxChannels) fail(20, "the PDB has more than 1024 channels");

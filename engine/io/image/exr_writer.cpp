@@ -23,7 +23,6 @@
 #include "engine/io/image/image.h"
 
 namespace ptc {
-namespace {
 
 // A stream that keeps the first error of a write, because the destructor of Imf::OutputFile
 // swallows errors.
@@ -51,6 +50,8 @@ class PublishedStream : public Imf::OStream {
   std::uint64_t at_ = 0;
   std::exception_ptr failure_;
 };
+
+namespace {
 
 std::vector<std::string> channel_names(const ExrLayerType& layer) {
   const std::string prefix = layer.name.empty() ? "" : layer.name + ".";

@@ -52,27 +52,27 @@ struct Places {
 };
 
 template <typename T>
-T load(const std::byte* at) noexcept {
+T read_at(const std::byte* at) noexcept {
   T value;
   std::memcpy(&value, at, sizeof value);
   return value;
 }
 
 template <typename T>
-void store(std::byte* at, const T& value) noexcept {
+void write_at(std::byte* at, const T& value) noexcept {
   std::memcpy(at, &value, sizeof value);
 }
 
 Point14 load_point14(const std::byte* at) noexcept {
   Point14 point;
   std::memcpy(static_cast<void*>(&point), at, kPoint14TimeAt);
-  point.time = load<std::uint64_t>(at + kPoint14TimeAt);
+  point.time = read_at<std::uint64_t>(at + kPoint14TimeAt);
   return point;
 }
 
 void store_point14(std::byte* at, const Point14& point) noexcept {
   std::memcpy(at, &point, kPoint14TimeAt);
-  store(at + kPoint14TimeAt, point.time);
+  write_at(at + kPoint14TimeAt, point.time);
 }
 
 [[noreturn]] void refuse_damage() {
@@ -100,8 +100,8 @@ class PointwiseDecoder : public ChunkDecoder {
     has_stream_ = points > 1;  // a chunk of one point may have bytes that mean nothing
     if (!has_stream_) return;
     in_.start(chunk.subspan(record_bytes_));
-    point_.start(load<Point10>(first));
-    if (places_.time != 0) time_.start(load<std::uint64_t>(first + places_.time));
+    point_.start(read_at<Point10>(first));
+    if (places_.time != 0) time_.start(read_at<std::uint64_t>(first + places_.time));
     rgb_.reset();
     wave_packet_.reset();
     for (SymbolModel& model : extra_) model.reset();
@@ -132,12 +132,13 @@ class PointwiseDecoder : public ChunkDecoder {
  private:
   // Decodes the record that follows `last`.
   void decode_record(const std::byte* last, std::byte* out) {
-    store(out, point_.decode(in_));
-    if (places_.time != 0) store(out + places_.time, time_.decode(in_));
-    if (places_.rgb != 0) store(out + places_.rgb, rgb_.decode(in_, load<Rgb>(last + places_.rgb)));
+    write_at(out, point_.decode(in_));
+    if (places_.time != 0) write_at(out + places_.time, time_.decode(in_));
+    if (places_.rgb != 0)
+      write_at(out + places_.rgb, rgb_.decode(in_, read_at<Rgb>(last + places_.rgb)));
     if (places_.wave_packet != 0) {
-      store(out + places_.wave_packet,
-            wave_packet_.decode(in_, load<WavePacket>(last + places_.wave_packet)));
+      write_at(out + places_.wave_packet,
+               wave_packet_.decode(in_, read_at<WavePacket>(last + places_.wave_packet)));
     }
     for (std::size_t i = places_.extra; i < record_bytes_; ++i) {
       SymbolModel& model = extra_[i - places_.extra];
@@ -234,10 +235,10 @@ class LayeredDecoder : public ChunkDecoder {
     const Point14 point = load_point14(first);
     point_.start(point);
     const unsigned channel = point.channel();
-    if (places_.rgb != 0) rgb_.start(channel, load<Rgb>(first + places_.rgb));
-    if (places_.nir != 0) nir_.start(channel, load<std::uint16_t>(first + places_.nir));
+    if (places_.rgb != 0) rgb_.start(channel, read_at<Rgb>(first + places_.rgb));
+    if (places_.nir != 0) nir_.start(channel, read_at<std::uint16_t>(first + places_.nir));
     if (places_.wave_packet != 0)
-      wave_packet_.start(channel, load<WavePacket>(first + places_.wave_packet));
+      wave_packet_.start(channel, read_at<WavePacket>(first + places_.wave_packet));
     for (std::size_t i = 0; i < extra_.size(); ++i)
       extra_[i].start(channel, first[places_.extra + i]);
   }
@@ -271,14 +272,14 @@ class LayeredDecoder : public ChunkDecoder {
       layers += field != 0 ? 1 : 0;
     const std::size_t fixed = record_bytes_ + 4 + 4 * layers;
     if (chunk.size() < fixed) throw LazError("the chunk is too short for the sizes of its layers");
-    if (load<std::uint32_t>(chunk.data() + record_bytes_) != points_)
+    if (read_at<std::uint32_t>(chunk.data() + record_bytes_) != points_)
       throw LazError("the chunk and the chunk table have different numbers of points");
 
     // Cut the rest into layers.
     const std::byte* size_at = chunk.data() + record_bytes_ + 4;
     auto rest = chunk.subspan(fixed);
     const auto start_layer = [&](Layer& layer) {
-      const auto bytes = load<std::uint32_t>(size_at);
+      const auto bytes = read_at<std::uint32_t>(size_at);
       size_at += 4;
       if (bytes > rest.size()) throw LazError("a layer is longer than its chunk");
       layer.present = bytes > 0;
@@ -308,20 +309,21 @@ class LayeredDecoder : public ChunkDecoder {
     // Decode what else the format has, in the channel that counts for it.
     const unsigned channel = own_channel_ || point_.channel_changed() ? point.channel() : 0;
     if (places_.rgb != 0) {
-      store(out + places_.rgb, rgb_.next(channel, [this](RgbDecoder& models, Rgb& last) {
+      write_at(out + places_.rgb, rgb_.next(channel, [this](RgbDecoder& models, Rgb& last) {
         if (rgb_layer_.present) last = models.decode(rgb_layer_.in, last);
       }));
     }
     if (places_.nir != 0) {
-      store(out + places_.nir, nir_.next(channel, [this](NirDecoder& models, std::uint16_t& last) {
-        if (nir_layer_.present) last = models.decode(nir_layer_.in, last);
-      }));
+      write_at(out + places_.nir,
+               nir_.next(channel, [this](NirDecoder& models, std::uint16_t& last) {
+                 if (nir_layer_.present) last = models.decode(nir_layer_.in, last);
+               }));
     }
     if (places_.wave_packet != 0) {
-      store(out + places_.wave_packet,
-            wave_packet_.next(channel, [this](WavePacketDecoder& models, WavePacket& last) {
-              if (wave_packet_layer_.present) last = models.decode(wave_packet_layer_.in, last);
-            }));
+      write_at(out + places_.wave_packet,
+               wave_packet_.next(channel, [this](WavePacketDecoder& models, WavePacket& last) {
+                 if (wave_packet_layer_.present) last = models.decode(wave_packet_layer_.in, last);
+               }));
     }
     for (std::size_t i = 0; i < extra_.size(); ++i) {
       Layer& layer = extra_layers_[i];

@@ -51,7 +51,7 @@ std::vector<glm::dvec2> project(std::span<const glm::dvec3> polygon) {
   return flat;
 }
 
-constexpr std::uint32_t kNone = 0xffffffff;
+constexpr std::uint32_t kNoMember = 0xffffffff;
 
 // Returns the default number of looks after which the rest of a polygon becomes a fan. A line meets
 // about sqrt(n) boxes of a k-d tree over n evenly spread points, and the worst simple polygons that
@@ -65,28 +65,28 @@ std::uint64_t usual_most_looks(std::size_t corners) {
 class Lists {
  public:
   Lists(std::size_t lists, std::size_t members)
-      : first_(lists, kNone), list_of_(members, kNone), before_(members), after_(members) {}
+      : first_(lists, kNoMember), list_of_(members, kNoMember), before_(members), after_(members) {}
 
   // Moves a member to the front of a list.
   void put(std::uint32_t member, std::uint32_t list) {
     take(member);
     list_of_[member] = list;
-    before_[member] = kNone;
+    before_[member] = kNoMember;
     after_[member] = first_[list];
-    if (first_[list] != kNone) before_[first_[list]] = member;
+    if (first_[list] != kNoMember) before_[first_[list]] = member;
     first_[list] = member;
   }
 
   // Removes a member from its list, if it is in one.
   void take(std::uint32_t member) {
-    if (list_of_[member] == kNone) return;
+    if (list_of_[member] == kNoMember) return;
     const std::uint32_t before = before_[member], after = after_[member];
-    (before == kNone ? first_[list_of_[member]] : after_[before]) = after;
-    if (after != kNone) before_[after] = before;
-    list_of_[member] = kNone;
+    (before == kNoMember ? first_[list_of_[member]] : after_[before]) = after;
+    if (after != kNoMember) before_[after] = before;
+    list_of_[member] = kNoMember;
   }
 
-  // Returns the first member of a list, or kNone when it is empty.
+  // Returns the first member of a list, or kNoMember when it is empty.
   [[nodiscard]] std::uint32_t first(std::uint32_t list) const { return first_[list]; }
 
  private:
@@ -98,14 +98,14 @@ class Lists {
 struct InwardCorners {
   std::vector<glm::dvec2> places;         // all different
   std::vector<std::uint32_t> corners_at;  // per place, number of corners that are not cut away
-  std::vector<std::uint32_t> place_of;    // per corner of the polygon, its place or kNone
+  std::vector<std::uint32_t> place_of;    // per corner of the polygon, its place or kNoMember
 };
 
 // Finds the corners that turn inwards. Cutting an ear never turns a bulging corner inwards, so they
 // stay the only ones that can lie in an ear.
 InwardCorners inward_corners(const std::vector<glm::dvec2>& points) {
   const std::size_t n = points.size();
-  InwardCorners inward{.place_of = std::vector<std::uint32_t>(n, kNone)};
+  InwardCorners inward{.place_of = std::vector<std::uint32_t>(n, kNoMember)};
   std::vector<std::uint32_t> corners;
   for (std::uint32_t i = 0; i < n; ++i) {
     if (turn(points[(i + n - 1) % n], points[i], points[(i + 1) % n]) <= 0) corners.push_back(i);
@@ -158,7 +158,7 @@ class EarClipper {
     std::uint32_t at = 0;
     for (; left > 3; --left) {
       const std::uint32_t ear = find_ear(at);
-      if (ear == kNone) break;
+      if (ear == kNoMember) break;
       triangles.push_back({previous_[ear], ear, next_[ear]});
       cut(ear);
       at = next_[next_[ear]];  // skip a corner, so that ears do not all share one apex
@@ -170,8 +170,8 @@ class EarClipper {
   }
 
  private:
-  // Returns the first ear of the ring from a corner on, or kNone when there is none or the search
-  // takes too many looks. Corners that are no ears are closed.
+  // Returns the first ear of the ring from a corner on, or kNoMember when there is none or the
+  // search takes too many looks. Corners that are no ears are closed.
   std::uint32_t find_ear(std::uint32_t from) {
     while (looks_ + tree_.looks() < max_looks_) {
       auto corner = open_.next(from);
@@ -181,7 +181,7 @@ class EarClipper {
       if (is_ear(i)) return i;
       open_.erase(i);
     }
-    return kNone;
+    return kNoMember;
   }
 
   // Says whether a corner can be cut: its triangle has no area, or it bulges and its triangle holds
@@ -209,9 +209,9 @@ class EarClipper {
     open_.insert(next_[i]);
     waiting_.take(i);
     const std::uint32_t place = inward_.place_of[i];
-    if (place == kNone || --inward_.corners_at[place] > 0) return;
+    if (place == kNoMember || --inward_.corners_at[place] > 0) return;
     tree_.remove(place);
-    for (std::uint32_t k = waiting_.first(place); k != kNone; k = waiting_.first(place)) {
+    for (std::uint32_t k = waiting_.first(place); k != kNoMember; k = waiting_.first(place)) {
       waiting_.take(k);
       open_.insert(k);
     }

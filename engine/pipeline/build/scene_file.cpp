@@ -33,11 +33,12 @@ constexpr std::uint64_t kJsonBytes = 25;  // memory of JSON for each byte of tex
 constexpr double kMax = std::numeric_limits<float>::max();
 
 /// Reads one scene file.
-class SceneReader {
+class SceneFileReader {
  public:
   /// @param places  whether files of places are read
-  SceneReader(const std::filesystem::path& path, TextureStore* textures, bool places,
-              std::uint64_t memory_bytes, const std::optional<Moment>& moment, SceneObjects& scene)
+  SceneFileReader(const std::filesystem::path& path, TextureStore* textures, bool places,
+                  std::uint64_t memory_bytes, const std::optional<Moment>& moment,
+                  SceneObjects& scene)
       : path_(path),
         textures_(textures),
         reads_places_(places),
@@ -273,7 +274,7 @@ SceneObjects read_objects(const std::vector<std::filesystem::path>& files, Textu
   SceneObjects scene;
   for (const std::filesystem::path& file : files) {
     if (is_scene_file(file)) {
-      SceneReader(file, textures, places, memory_bytes, moment, scene).read();
+      SceneFileReader(file, textures, places, memory_bytes, moment, scene).read();
     } else {
       scene.objects.push_back({.file = file});
     }

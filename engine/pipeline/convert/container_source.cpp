@@ -20,7 +20,7 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kPieceBytes = sizeof(PointRecord) - sizeof(MortonKey);
-constexpr std::size_t kBlock = 1 << 13;  // points that are cut into pieces at once
+constexpr std::size_t kPieceBlock = 1 << 13;  // points that are cut into pieces at once
 constexpr std::uint64_t kMinPieceSortBytes = std::uint64_t{8} << 20;  // of each sort
 
 std::byte* piece_of(PointRecord& record) noexcept {
@@ -59,7 +59,7 @@ class InputOrder : public PointSource {
     for (std::uint64_t i = 0; i < points; i += step) sample.push_back({0, i});
     for (std::size_t i = 0; i < pieces; ++i) {
       sorts_.push_back(std::make_unique<ExternalSorter>(options, executor, sample));
-      blocks_.emplace_back(kBlock);
+      blocks_.emplace_back(kPieceBlock);
     }
     // Sort all points
     PointScan scan(container);
@@ -69,7 +69,7 @@ class InputOrder : public PointSource {
 
   std::size_t next(std::span<Surfel> out) override {
     // Read the pieces of the next points side by side
-    std::size_t count = std::min(out.size(), kBlock);
+    std::size_t count = std::min(out.size(), kPieceBlock);
     for (std::size_t i = 0; i < streams_.size(); ++i)
       count = std::min(count, read_full(*streams_[i], std::span(blocks_[i]).first(count)));
     // Join them, and leave the index out of the rows
@@ -96,7 +96,7 @@ class InputOrder : public PointSource {
   void add(const PointPage& points, std::span<const std::byte> rows) {
     joined_.resize(sorts_.size() * kPieceBytes);
     for (std::uint32_t done = 0; done < points.size();) {
-      const std::size_t count = std::min<std::size_t>(kBlock, points.size() - done);
+      const std::size_t count = std::min<std::size_t>(kPieceBlock, points.size() - done);
       for (std::size_t i = 0; i < count; ++i, ++done) {
         const PointRecord record = points[done];
         const std::byte* const row = rows.data() + done * rows_.row_bytes();

@@ -23,7 +23,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBlock = 1 << 13;  // points that are copied at once
+constexpr std::size_t kCopyBlock = 1 << 13;  // points that are copied at once
 
 OutputFormat format_of(const std::filesystem::path& target) {
   const std::optional<OutputFormat> format = output_format(target);
@@ -38,7 +38,7 @@ void copy_points(PointSource& source, const std::filesystem::path& target, Outpu
                  const PointWriteInfo& info, Progress& progress) {
   note_changed_values(target, info, progress);
   const std::unique_ptr<PointWriter> writer = create_points(target, format, info);
-  std::vector<Surfel> block(kBlock);
+  std::vector<Surfel> block(kCopyBlock);
   while (const std::size_t count = source.next(block)) {
     writer->write(std::span(block).first(count), source.attributes());
     progress.advance(count);
@@ -53,7 +53,7 @@ void measure(PointSource& source, std::optional<PointSurvey>& survey,
              Progress* progress = nullptr) {
   info.count = 0;
   info.bounds = {};
-  std::vector<Surfel> block(kBlock);
+  std::vector<Surfel> block(kCopyBlock);
   while (const std::size_t count = source.next(block)) {
     for (std::size_t i = 0; i < count; ++i) info.bounds.add(block[i].position);
     info.count += count;
@@ -102,7 +102,7 @@ void measure_rounding(const ContainerReader& container, const PointFileOptions& 
   RoundingSurvey survey(format, info);
   try {
     const std::unique_ptr<PointSource> source = open_selected(container, selection);
-    std::vector<Surfel> block(kBlock);
+    std::vector<Surfel> block(kCopyBlock);
     while (const std::size_t count = source->next(block))
       survey.add(std::span(block).first(count), source->attributes());
   } catch (const FormatError&) {

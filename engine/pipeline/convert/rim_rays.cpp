@@ -10,10 +10,10 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kCacheBytes = std::uint64_t{16} << 20;  // of neighbouring pages
+constexpr std::uint64_t kRimCacheBytes = std::uint64_t{16} << 20;  // of neighbouring pages
 
 std::uint64_t cache_bytes(const ContainerReader& scene) {
-  return std::max(kCacheBytes, PageCache::min_bytes(scene, 1, BackEnd::pread));
+  return std::max(kRimCacheBytes, PageCache::min_bytes(scene, 1, BackEnd::pread));
 }
 
 }  // namespace

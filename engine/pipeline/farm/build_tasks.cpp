@@ -28,7 +28,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kBlock = 1 << 14;  // surfels read from a source at once
+constexpr std::size_t kSurfelBlock = 1 << 14;  // surfels read from a source at once
 constexpr std::uint64_t kAll = std::numeric_limits<std::uint64_t>::max();
 
 constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
@@ -134,8 +134,8 @@ class Route {
   AttributePlan attributes_;
   std::vector<std::vector<PointRecord>> values_;
   RangeWriter writer_;
-  std::vector<Surfel> surfels_ = std::vector<Surfel>(kBlock);
-  std::vector<PointRecord> records_ = std::vector<PointRecord>(kBlock);
+  std::vector<Surfel> surfels_ = std::vector<Surfel>(kSurfelBlock);
+  std::vector<PointRecord> records_ = std::vector<PointRecord>(kSurfelBlock);
   std::uint64_t points_ = 0;  ///< number of the next point among all inputs
 };
 

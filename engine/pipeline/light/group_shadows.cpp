@@ -10,11 +10,11 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kCacheBytes = std::uint64_t{24} << 20;
+constexpr std::uint64_t kShadowCacheBytes = std::uint64_t{24} << 20;
 constexpr LightSampling kSampling{};  // its rays of suns; there are no emitters
 
 std::uint64_t cache_bytes(const ContainerReader& scene, unsigned threads, BackEnd back_end) {
-  return std::max(kCacheBytes, PageCache::min_bytes(scene, threads, back_end));
+  return std::max(kShadowCacheBytes, PageCache::min_bytes(scene, threads, back_end));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kSeed = std::uint64_t{1} << 53;  // far from the seeds of runs
+constexpr std::uint64_t kPointSeed = std::uint64_t{1} << 53;  // far from the seeds of runs
 
 }  // namespace
 
@@ -33,7 +33,7 @@ std::vector<Shading> PointJudge::trace(const ContainerReader& scene) const {
   charge_directory(budget, exact_);
   if (&scene != &exact_) charge_directory(budget, scene);
   charge_sky(budget, lights.sky);
-  return trace_pairs(scene, lights.sky, receivers_, {.rays = kRays, .seed = kSeed}, budget,
+  return trace_pairs(scene, lights.sky, receivers_, {.rays = kRays, .seed = kPointSeed}, budget,
                      executor_);
 }
 

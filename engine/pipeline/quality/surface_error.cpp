@@ -27,7 +27,7 @@ namespace ptc {
 namespace {
 
 // The seed of the rays at the mesh and of those at the surfels, far from the seeds of runs
-constexpr std::uint64_t kSeed = std::uint64_t{1} << 52;
+constexpr std::uint64_t kSurfaceSeed = std::uint64_t{1} << 52;
 constexpr std::uint64_t kPlaceSeed = 0x5eed;
 
 /// Returns the memory for meshes and the rays at them.
@@ -116,9 +116,9 @@ void SurfaceJudge::trace_truth(const RayScene& rays, const DirectLight& light, b
     const SurfaceHit& at = places_[i / 2].at;
     const glm::vec3 normal = at.front ? at.normal : -at.normal;
     std::vector<glm::vec3> directions;
-    cosine_directions(normal, kRays, kSeed + i, directions);
+    cosine_directions(normal, kRays, kSurfaceSeed + i, directions);
     const RayTraced found =
-        trace_mesh(rays, light, at.position, normal, directions, paths, kSeed + i);
+        trace_mesh(rays, light, at.position, normal, directions, paths, kSurfaceSeed + i);
     truth_[i] = {.occlusion = found.occlusion, .irradiance = found.irradiance, .sky = found.sky};
   });
 }
@@ -156,9 +156,9 @@ BoundedError SurfaceJudge::measure(const ContainerReader& scene) {
   return_freed_memory();
 
   // Trace the same rays at the surfels
-  return error_of_pairs(
-      trace_pairs(scene, lights.sky, receivers, {.rays = kRays, .seed = kSeed}, left, executor_),
-      truth_);
+  return error_of_pairs(trace_pairs(scene, lights.sky, receivers,
+                                    {.rays = kRays, .seed = kSurfaceSeed}, left, executor_),
+                        truth_);
 }
 
 }  // namespace ptc

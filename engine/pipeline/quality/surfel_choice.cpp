@@ -17,12 +17,13 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kFirst = 16'384, kFewest = 256, kMost = 100'000'000;  // surfels
+constexpr std::uint64_t kFirstCount = 16'384, kFewestCount = 256,
+                        kMostCount = 100'000'000;  // surfels
 // Growth from one trial to the next, at least and at most: a power of how far the error is above
 // what is asked, as errors fall on most meshes
-constexpr double kGrowth = 1.5, kLeastGrowth = 1.5, kMostGrowth = 4;
-constexpr double kNear = 1.2;     // ratio of numbers between which nothing is tried
-constexpr double kBetter = 0.95;  // of the even error, below which the spacing adapts
+constexpr double kGrowthPower = 1.5, kLeastGrowth = 1.5, kMostGrowth = 4;
+constexpr double kNearCount = 1.2;  // ratio of numbers between which nothing is tried
+constexpr double kBetter = 0.95;    // of the even error, below which the spacing adapts
 // The error has stopped falling when it is still that share of one with a sixteenth of the surfels
 constexpr double kStalled = 0.8, kStalledOver = 16;
 constexpr double kAsGood = 1.05;  // times the least error
@@ -32,31 +33,31 @@ constexpr char kNoRoom[] =
     "sampling takes";
 
 std::uint64_t rounded(double count) {
-  return std::clamp(static_cast<std::uint64_t>(std::llround(count)), kFewest, kMost);
+  return std::clamp(static_cast<std::uint64_t>(std::llround(count)), kFewestCount, kMostCount);
 }
 
-using RunTrial = std::function<SurfelTrial(std::uint64_t, bool)>;
+using RunSurfelTrial = std::function<SurfelTrial(std::uint64_t, bool)>;
 
 /// The trials of a search: the first two tell whether the spacing adapts in all others.
 class Search {
  public:
-  Search(double asked, const RunTrial& run_trial)
+  Search(double asked, const RunSurfelTrial& run_trial)
       : run_trial_(run_trial), choice_{.asked = asked} {}
 
   SurfelChoice run() {
     // Take the better spacing
-    const SurfelTrial even = trial(kFirst, false), adapted = trial(kFirst, true);
+    const SurfelTrial even = trial(kFirstCount, false), adapted = trial(kFirstCount, true);
     adapts_ = adapted.found.error.relative() < kBetter * even.found.error.relative();
     const SurfelTrial& first = adapts_ ? adapted : even;
     // Bracket the number
     std::optional<SurfelTrial> good, bad;
     (is_good(first) ? good : bad) = first;
-    while (!good && bad->count < kMost && !has_stalled()) take(more_than(*bad), good, bad);
-    while (!bad && good->count > kFewest)
+    while (!good && bad->count < kMostCount && !has_stalled()) take(more_than(*bad), good, bad);
+    while (!bad && good->count > kFewestCount)
       take(rounded(static_cast<double>(good->count) / kMostGrowth), good, bad);
     // Close in on it
     while (good && bad &&
-           static_cast<double>(good->count) > kNear * static_cast<double>(bad->count))
+           static_cast<double>(good->count) > kNearCount * static_cast<double>(bad->count))
       take(rounded(std::sqrt(static_cast<double>(good->count) * static_cast<double>(bad->count))),
            good, bad);
     choice_.met = good.has_value();
@@ -82,7 +83,7 @@ class Search {
 
   /// Returns the number of surfels to try after one that is too small.
   [[nodiscard]] std::uint64_t more_than(const SurfelTrial& bad) const {
-    const double growth = std::pow(bad.found.high / choice_.asked, kGrowth);
+    const double growth = std::pow(bad.found.high / choice_.asked, kGrowthPower);
     return rounded(static_cast<double>(bad.count) * std::clamp(growth, kLeastGrowth, kMostGrowth));
   }
 
@@ -108,7 +109,7 @@ class Search {
     return std::ranges::min(as_good, {}, &SurfelTrial::count);
   }
 
-  const RunTrial& run_trial_;
+  const RunSurfelTrial& run_trial_;
   SurfelChoice choice_;
   bool adapts_ = false;
 };
@@ -148,7 +149,7 @@ SurfelTrial SurfelTrials::run(std::uint64_t count, bool adapts) {
   return trial;
 }
 
-SurfelChoice search_surfels(double asked, const RunTrial& run) {
+SurfelChoice search_surfels(double asked, const RunSurfelTrial& run) {
   return Search(asked, run).run();
 }
 

@@ -30,10 +30,10 @@
 namespace ptc {
 namespace {
 
-constexpr double kMax = std::numeric_limits<float>::max();
-constexpr Range kFinite{-kMax, kMax};
+constexpr double kMostFloat = std::numeric_limits<float>::max();
+constexpr Range kFinite{-kMostFloat, kMostFloat};
 constexpr Range kPlace{-kMaxLightDistance, kMaxLightDistance};
-constexpr Range kLight{0, kMax};
+constexpr Range kLight{0, kMostFloat};
 constexpr Range kAngle{0, 1.5707964};
 
 // Checks that every number can be written. JSON has null in place of numbers that are not finite,

@@ -11,7 +11,7 @@ namespace ptc {
 namespace {
 
 constexpr double kWide = 4;  // spacing of the first surfels, over the even one
-constexpr double kPatchSurfels = 1024;
+constexpr double kWishPatchSurfels = 1024;
 constexpr double kCell = 2;  // of the map, over the even spacing
 // A spacing over the even one
 constexpr double kFinest = 0.4;
@@ -55,7 +55,7 @@ std::optional<SpacingMap> adapted_spacing(const PatchSampler& sampler, const Ray
   SamplingOptions wide;
   wide.spacing = kWide * spacing;
   const SpacingField field(wide);
-  const SurfacePatches patches(scene.mesh(), field, kPatchSurfels, first);
+  const SurfacePatches patches(scene.mesh(), field, kWishPatchSurfels, first);
   std::vector<std::vector<SurfaceDetail>> found(patches.size());
   executor.for_each(patches.size(), [&](std::size_t i, unsigned) {
     found[i] = sampler.look_closely(patches.spread(i, PatchSampler::kPointsPerSurfel));

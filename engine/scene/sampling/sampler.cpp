@@ -43,12 +43,12 @@ class MeshSource final : public PatchStream {
   /// Scales the map so that there are as many surfels as an even spacing makes. A map alone makes
   /// more, because a piece of surface has the finest spacing that is asked for in it.
   void keep_number(const Mesh& mesh, const SamplingOptions& options, std::uint32_t first) {
-    constexpr int kRounds = 3;
+    constexpr int kSpacingRounds = 3;
     constexpr double kClose = 0.01;
     const SpacingField even(options);
     const auto wanted =
         static_cast<double>(SurfacePatches(mesh, even, kPatchSurfels, first).surfels());
-    for (int i = 0; i < kRounds; ++i) {
+    for (int i = 0; i < kSpacingRounds; ++i) {
       const double share = static_cast<double>(patches_->surfels()) / wanted;
       if (std::abs(share - 1) < kClose || !(share > 0)) return;
       map_->scale(std::sqrt(share));

@@ -11,7 +11,7 @@
 namespace ptc {
 namespace {
 
-constexpr double kPatchSurfels = 4096;
+constexpr double kPieceSurfels = 4096;
 // A patch and its ray scene, and points and surfels of so many surfels
 static_assert(StreamingRoom::kLeastBytes >= PieceFile::kPatchBytes + (std::uint64_t{10} << 20));
 static_assert(StreamingRoom::kLeastBytes >= SpilledMesh::kBytes + PieceSortOptions::kLeastBytes);
@@ -27,7 +27,7 @@ class StreamedSource final : public PatchStream {
       : PatchStream(executor,
                     static_cast<unsigned>(room.memory_bytes / StreamingRoom::kLeastBytes)),
         field_(with_spacing(options, found.area)),
-        pieces_(parts, found, field_, kPatchSurfels, sort_options(room), executor) {}
+        pieces_(parts, found, field_, kPieceSurfels, sort_options(room), executor) {}
 
  private:
   [[nodiscard]] std::size_t patches() const override { return pieces_.size(); }
@@ -58,7 +58,7 @@ std::uint64_t streaming_bytes(const SurfaceSurvey& found, const SamplingOptions&
   const double square = options.spacing * options.spacing;
   const auto surfels = static_cast<std::uint64_t>(square > 0 ? found.area / square : 0);
   constexpr std::uint64_t kPlaceBytes = 192;  // of a place in its group and its turn
-  return PieceFile::index_bytes(found.triangles, surfels, kPatchSurfels) +
+  return PieceFile::index_bytes(found.triangles, surfels, kPieceSurfels) +
          kPlaceBytes * found.places();
 }
 

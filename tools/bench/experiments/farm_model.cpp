@@ -24,7 +24,7 @@ struct Stage {
 };
 
 /// How long a stage would take if nothing but one thing took time.
-struct Bounds {
+struct Limits {
   double cpu = 0, node = 0, store = 0, files = 0, scheduler = 0, longest = 0;
 };
 
@@ -100,7 +100,7 @@ class StageRun {
   std::priority_queue<double, std::vector<double>, std::greater<>> computing_;  // their ends
 };
 
-void add_bounds(Bounds& sum, const Stage& stage, const FarmHardware& hardware) {
+void add_bounds(Limits& sum, const Stage& stage, const FarmHardware& hardware) {
   const auto tasks = static_cast<double>(stage.tasks);
   const auto nodes = static_cast<double>(hardware.nodes);
   const double cores = nodes * static_cast<double>(hardware.cores);
@@ -114,7 +114,7 @@ void add_bounds(Bounds& sum, const Stage& stage, const FarmHardware& hardware) {
                  stage.bytes / std::min(hardware.node_bytes, hardware.store_bytes);
 }
 
-std::string limit_of(const Bounds& bounds) {
+std::string limit_of(const Limits& bounds) {
   const std::array<std::pair<double, const char*>, 6> all{{{bounds.cpu, "computing"},
                                                            {bounds.node, "net of the machines"},
                                                            {bounds.store, "file system"},
@@ -153,7 +153,7 @@ FarmTimes play(const FarmLoad& load, const TaskCosts& costs, const FarmHardware&
                       .bytes = plan + points * (costs.stored_bytes + 2 * costs.shade_bytes),
                       .opened = 4 + parts + 2 * ranges};
   FarmTimes times;
-  Bounds bounds;
+  Limits bounds;
   for (const auto& [stage, seconds] :
        {std::pair(&route, &times.route), std::pair(&part, &times.part),
         std::pair(&join, &times.join), std::pair(&shade, &times.shade),

@@ -20,14 +20,14 @@ namespace ptc::bench {
 namespace {
 
 /// A page as it lies in memory, with the columns by which it can be packed.
-struct Payload {
+struct PagePayload {
   std::vector<std::byte> bytes;
   PayloadColumns columns;
 };
 
 /// The pages of nodes.
-std::vector<Payload> node_payloads(const ContainerReader& container) {
-  std::vector<Payload> pages;
+std::vector<PagePayload> node_payloads(const ContainerReader& container) {
+  std::vector<PagePayload> pages;
   std::vector<std::byte> buffer(container.page_payload_limit());
   PageDecoder decoder;
   for (const std::uint32_t page : container.node_pages()) {
@@ -39,7 +39,7 @@ std::vector<Payload> node_payloads(const ContainerReader& container) {
 
 /// The pages of points.
 struct PointPayloads {
-  std::vector<Payload> pages;
+  std::vector<PagePayload> pages;
   double moved = 0;  ///< maximum of moved() over all points
 };
 
@@ -80,7 +80,7 @@ class PageStudy {
 
   /// Measures one codec and level on pages of one form.
   /// @param form  points, packed, rounded or nodes
-  [[nodiscard]] ModelRow measure(const std::vector<Payload>& pages, const std::string& form,
+  [[nodiscard]] ModelRow measure(const std::vector<PagePayload>& pages, const std::string& form,
                                  Codec codec, int level) const {
     const bool nodes = form == "nodes";
     PageEncoder encoder(codec, level);
@@ -113,7 +113,7 @@ class PageStudy {
     std::vector<std::byte> bytes;
   };
 
-  void decode(const std::vector<Payload>& pages, const std::vector<Stored>& stored) const {
+  void decode(const std::vector<PagePayload>& pages, const std::vector<Stored>& stored) const {
     PageDecoder decoder;
     std::vector<std::byte> payload(scene_.container().page_payload_limit());
     for (std::size_t i = 0; i < pages.size(); ++i) {
@@ -131,7 +131,7 @@ class PageStudy {
 std::vector<ModelRow> study_pages(const BenchScene& scene, const ModelOptions& options) {
   const PageStudy study(scene, options.repeats);
   std::vector<ModelRow> rows;
-  const auto add = [&](const std::vector<Payload>& pages, const std::string& form) {
+  const auto add = [&](const std::vector<PagePayload>& pages, const std::string& form) {
     const std::size_t first = rows.size();
     if (form == "points" || form == "nodes")
       rows.push_back(study.measure(pages, form, Codec::raw, 0));

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "engine/base/basis.h"
+#include "tools/bench/hunt/rounding.h"
 #include "tools/bench/hunt/scene.h"
 #include "tools/bench/shapes/random.h"
 
@@ -15,15 +16,6 @@ namespace {
 
 constexpr int kPatches = 3, kNeighbours = 8, kLone = 16, kOff = 8;
 constexpr double kLift = 0.15;  // what programs lift receivers by, in radii of the surfel
-
-/// Rounds to a multiple of a decimal unit, so that the text of a scene is short.
-double rounded(double value, double steps) {
-  return std::round(value * steps) / steps;
-}
-
-glm::dvec3 rounded(const glm::dvec3& v, double steps) {
-  return {rounded(v.x, steps), rounded(v.y, steps), rounded(v.z, steps)};
-}
 
 class Drawer {
  public:

@@ -4,19 +4,12 @@
 #include <vector>
 
 #include "tools/bench/hunt/judge.h"
+#include "tools/bench/hunt/rounding.h"
 
 namespace ptc::bench {
 namespace {
 
 constexpr double kKept = 0.8;  // share of the error that a smaller scene must have
-
-double rounded(double value, double steps) {
-  return std::round(value * steps) / steps + 0.0;  // and no negative zero
-}
-
-glm::dvec3 rounded(const glm::dvec3& v, double steps) {
-  return {rounded(v.x, steps), rounded(v.y, steps), rounded(v.z, steps)};
-}
 
 /// Returns simpler shapes to try in place of a shape, the simplest first.
 std::vector<Shape> simpler(const Shape& shape) {
