@@ -56,7 +56,7 @@ TEST_CASE("farm model: what is shared is divided among those who use it", "[benc
   CHECK(by_nodes.route == Approx((80e6 + 10 * plan) / 2e6));
   CHECK(by_nodes.part == Approx((60e6 + 20 * plan) / 2e6));
   CHECK(by_nodes.limit == "net of the machines");
-  CHECK(by_nodes.moved_bytes == Approx(140e6 + 60e6 + 33 * plan));
+  CHECK(by_nodes.moved_bytes == Approx(140e6 + 40e6 + 33 * plan));
   hardware.store_bytes = 1e6;
   const FarmTimes by_store = play(kLoad, costs, hardware);
   CHECK(by_store.route == Approx((80e6 + 10 * plan) / 1e6));
@@ -70,7 +70,7 @@ TEST_CASE("farm model: what is shared is divided among those who use it", "[benc
   const FarmTimes opening = play(kLoad, costs, hardware);
   CHECK(opening.part == Approx(20 * (4 + 2 * 10) * 1e-3));
   CHECK(opening.limit == "opening files");
-  CHECK(opening.opened == Approx(10 * 4 + 20 * 24 + (4 + 40 + 10) + (4 + 20) + (4 + 20 + 2)));
+  CHECK(opening.opened == Approx(10 * 4 + 20 * 24 + (4 + 40 + 10) + (4 + 20) + (4 + 1)));
 }
 
 TEST_CASE("farm model: tasks that come one by one do not share what they use", "[bench][farm]") {
@@ -93,14 +93,47 @@ TEST_CASE("farm model: each task starts and reads the plan", "[bench][farm]") {
   CHECK(times.cpu_seconds == Approx(33 * (0.5 + 33 * 0.25)));
 }
 
-TEST_CASE("farm model: ranges are shaded beside each other and collected by one", "[bench][farm]") {
-  const TaskCosts costs{.shade_seconds = 1e-4, .collect_seconds = 1e-6, .shade_bytes = 10};
-  const FarmLoad load{.points = 1'000'000, .ranges = 8};
+TEST_CASE("farm model: parts are lit and get their bounces one wave after another",
+          "[bench][farm]") {
+  const TaskCosts costs{.join_seconds = 0.05,
+                        .light_seconds = 4e-5,
+                        .bounce_seconds = 1e-4,
+                        .stored_bytes = 20,
+                        .edge_bytes = 1000};
+  FarmLoad load = kLoad;
+  const FarmTimes built = play(load, costs, free_of_limits(1, 4));
+  CHECK(built.light == 0);
+  CHECK(built.bounce == 0);
+  load.lit = true;
+  load.waves = 2;
   const FarmTimes times = play(load, costs, free_of_limits(1, 4));
-  CHECK(times.shade == Approx(25));
-  CHECK(times.collect == Approx(1));
-  CHECK(times.built() == Approx(0).margin(1e-9));
-  CHECK(times.moved_bytes == Approx(30e6 + 12 * plan_bytes(load)));
+  // 20 parts of 2 s on 4 cores, a join of 1 s; twice 20 parts of 5 s and a join
+  CHECK(times.light == Approx(10 + 1));
+  CHECK(times.bounce == Approx(2 * (25 + 1)));
+  CHECK(times.total() == Approx(built.total() + times.light + times.bounce));
+  CHECK(times.cpu_seconds == Approx(built.cpu_seconds + 41 + 2 * 101));
+  TaskCosts with_ends = costs;
+  with_ends.batch_points = 10'000;  // at 19 borders, over 20 parts
+  CHECK(play(load, with_ends, free_of_limits(1, 4)).bounce == Approx(2 * (25 * 1.19 + 1)));
+  const double plans = 96 * plan_bytes(load) - 33 * plan_bytes(kLoad);
+  CHECK(times.moved_bytes == Approx(built.moved_bytes + 3 * (60e6 + 40'000) + plans));
+  CHECK(times.opened == Approx(built.opened + 3 * (20 * 24 + 44)));
+}
+
+TEST_CASE("farm model: ranges are shaded beside each other, and may be collected by one",
+          "[bench][farm]") {
+  const TaskCosts costs{.shade_seconds = 1e-4, .collect_seconds = 1e-6, .shade_bytes = 10};
+  FarmLoad load{.points = 1'000'000, .ranges = 8};
+  const FarmTimes files = play(load, costs, free_of_limits(1, 4));
+  CHECK(files.shade == Approx(25));
+  CHECK(files.collect == Approx(0).margin(1e-9));
+  CHECK(files.moved_bytes == Approx(10e6 + 12 * plan_bytes(load)));
+  load.collected = true;
+  const FarmTimes one = play(load, costs, free_of_limits(1, 4));
+  CHECK(one.collect == Approx(1));
+  CHECK(one.total() == Approx(26));
+  CHECK(one.built() == Approx(0).margin(1e-9));
+  CHECK(one.moved_bytes == Approx(30e6 + 12 * plan_bytes(load)));
 }
 
 TEST_CASE("farm model: slow tasks hold up their stage alone", "[bench][farm]") {
@@ -130,6 +163,8 @@ TEST_CASE("farm: parts hold what one run holds, and the model has a row for each
   CHECK(result.costs.route_seconds > 0);
   CHECK(result.costs.part_seconds > 0);
   CHECK(result.costs.shade_seconds > 0);
+  CHECK(result.costs.light_seconds > 0);
+  CHECK(result.costs.bounce_seconds > result.costs.light_seconds);
   CHECK(result.costs.collect_seconds > 0);
   CHECK(result.costs.shade_bytes > 0);
   CHECK(result.costs.row_bytes == Approx(34).margin(8));

@@ -156,12 +156,11 @@ void check_plan(const FarmPlan& plan) {
   require(plan, request.selection.every >= 1, "it takes the first of every 0 points");
   require(plan, std::isfinite(plan.frame.edge) && plan.frame.edge > 0, "the frame has no edge");
   require(plan, !plan.inputs.empty(), "it has no inputs");
+  const bool city = request.city_points > 0;
+  const std::uint64_t blocks = city ? city_blocks(request.city_points) : 0;
   for (const FarmInput& input : plan.inputs) {
-    require(plan, input.path.empty() == (request.city_points > 0),
-            "its inputs are neither files nor the city");
-    require(plan,
-            !input.path.empty() || (input.blocks.first <= input.blocks.end &&
-                                    input.blocks.end <= city_blocks(request.city_points)),
+    require(plan, input.path.empty() == city, "its inputs are neither files nor the city");
+    require(plan, input.blocks.first <= input.blocks.end && input.blocks.end <= blocks,
             "an input has blocks that the city lacks");
     check_channels(plan, input);
   }

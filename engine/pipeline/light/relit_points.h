@@ -37,6 +37,8 @@ struct PointRange {
 /// them.
 class RelitPoints : public PointStream {
  public:
+  static constexpr std::size_t kBatch = 16 * Shader::kBlock;  ///< points that are lit at once
+
   /// @param scene     must outlive this
   /// @param progress  gets the points that are handed out; must outlive this
   RelitPoints(const ContainerReader& scene, const PointRange& range, Progress& progress);
@@ -45,8 +47,6 @@ class RelitPoints : public PointStream {
   std::size_t next(std::span<PointRecord> out) override;
 
  protected:
-  static constexpr std::size_t kBatch = 16 * Shader::kBlock;  ///< points that are lit at once
-
   /// Sets what the points of a batch reflect.
   /// @param first  number of the first one, a multiple of kBatch
   virtual void relight(std::span<PointRecord> records, std::uint64_t first) = 0;

@@ -13,12 +13,14 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 #include "engine/base/error.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/farm/tasks.h"
+#include "engine/pipeline/light/relit_points.h"
 #include "engine/store/reader.h"
 #include "tools/bench/references/timed_runs.h"
 #include "tools/bench/scenes/work_file.h"
@@ -26,9 +28,9 @@
 namespace ptc::bench {
 namespace {
 
-// CPU time of `ptcfarm part` that finds its task done or not yet to be done, with plans of 5 and of
-// 10,006 tasks, medians of 5 and 3 runs
-constexpr double kStartSeconds = 0.01, kListedSeconds = 2.1e-5;
+// CPU time of `ptcfarm part` that finds its task done or not yet to be done, with plans of 6 and of
+// 9,009 tasks, medians of 3 and 5 runs
+constexpr double kStartSeconds = 0.01, kListedSeconds = 1.5e-5;
 constexpr std::uint64_t kModelRoutePoints = 40'000'000, kModelPartPoints = 50'000'000,
                         kModelRangePoints = 10'000'000;
 
@@ -55,6 +57,7 @@ struct KindCost {
   double cpu = 0;
   std::uint64_t runs = 0;
 };
+using KindCosts = std::map<TaskKind, KindCost>;
 
 class FarmMeasurement {
  public:
@@ -126,10 +129,14 @@ class FarmMeasurement {
   }
 
   /// Plans a city in parts.
-  /// @param shading  how it is shaded; empty: not at all
+  /// @param shading, lighting  how it is shaded, and lit; empty: not at all
   [[nodiscard]] FarmPlan plan_city(const BuildRequest& city, std::uint64_t parts,
-                                   const std::optional<FarmShading>& shading = {}) const {
-    FarmOptions options{.parts = parts, .memory_bytes = options_.task_memory, .shading = shading};
+                                   const std::optional<FarmShading>& shading = {},
+                                   const std::optional<LightRequest>& lighting = {}) const {
+    FarmOptions options{.parts = parts,
+                        .memory_bytes = options_.task_memory,
+                        .lighting = lighting,
+                        .shading = shading};
     options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
     Progress silent;
     FarmPlan plan = make_plan(city, folder_.path() / "parts.ptcx", folder_.path() / "parts.json",
@@ -142,41 +149,48 @@ class FarmMeasurement {
     const FarmPlan plan = plan_city(request(workers), options_.parts);
     for (const TaskKind kind : {TaskKind::route, TaskKind::part, TaskKind::join}) {
       if (kind == TaskKind::join) note_sizes(plan);
-      run_timed(plan, kind, workers);
+      run_timed(plan, kind, workers, building_);
     }
     return content_of(plan.scene);
   }
 
-  /// Measures the tasks that shade, with a city of their own: a point takes hundreds of times as
-  /// long as to build it.
+  /// Measures the tasks that light and shade, with a smaller city: a point takes hundreds of times
+  /// as long as to build it.
   void measure_shading() {
     progress_.begin("shade", options_.repeats, "runs");
     for (unsigned repeat = 0; repeat < options_.repeats; ++repeat) {
       folder_.clear();
       BuildRequest city = request(1);
       city.city_points = options_.shaded;
-      const FarmPlan plan = plan_city(
-          city, 2,
-          FarmShading{.target = folder_.path() / "shaded.ply", .request = {}, .ranges = 2});
-      for (const TaskKind kind : {TaskKind::route, TaskKind::part, TaskKind::join})
-        run_kind(plan, kind, 1);
-      run_timed(plan, TaskKind::shade, 1);
-      std::uint64_t bytes = 0;
-      for (std::size_t i = 0; i < 2; ++i)
-        bytes += std::filesystem::file_size(plan.output({TaskKind::shade}, i));
-      run_timed(plan, TaskKind::collect, 1);
-      shaded_ = ContainerReader(plan.scene).superblock().points;
-      sizes_.shade_bytes = static_cast<double>(bytes) / static_cast<double>(shaded_);
+      LightRequest sun;
+      sun.lights.emplace().suns.push_back({.to_sun = glm::normalize(glm::vec3(1, 2, 1))});
+      FarmShading shading{.target = folder_.path() / "shaded.ply", .request = {}, .ranges = 2};
+      shading.request.bounces = 2;
+      const FarmPlan plan = plan_city(city, 2, shading, sun);
+      for (const FarmTask& task : plan.tasks) {
+        if (task.number > 0) continue;  // its step has been run
+        if (task.step.kind == TaskKind::collect) note_shaded(plan);
+        run_timed(plan, task.step.kind, 1, shading_);
+      }
       progress_.advance(1);
     }
     progress_.end();
   }
 
+  /// Notes what a point takes in the files of the ranges. @pre they are shaded
+  void note_shaded(const FarmPlan& plan) {
+    std::uint64_t bytes = 0;
+    for (std::size_t i = 0; i < 2; ++i)
+      bytes += std::filesystem::file_size(plan.output({TaskKind::shade}, i));
+    shaded_ = ContainerReader(plan.scene).superblock().points;
+    sizes_.shade_bytes = static_cast<double>(bytes) / static_cast<double>(shaded_);
+  }
+
   /// Runs all tasks of a kind, and counts their CPU time.
-  void run_timed(const FarmPlan& plan, TaskKind kind, unsigned workers) {
+  void run_timed(const FarmPlan& plan, TaskKind kind, unsigned workers, KindCosts& costs) const {
     const Stopwatch stopwatch;
     run_kind(plan, kind, workers);
-    KindCost& sum = kinds_[kind];
+    KindCost& sum = costs[kind];
     sum.cpu += stopwatch.cost().cpu;
     ++sum.runs;
   }
@@ -217,16 +231,19 @@ class FarmMeasurement {
   }
 
   [[nodiscard]] TaskCosts costs() const {
-    const auto of = [&](TaskKind kind) {
-      const KindCost& cost = kinds_.at(kind);
-      return cost.cpu / static_cast<double>(cost.runs);
+    const auto over = [](const KindCost& cost, std::uint64_t number) {
+      return cost.cpu / static_cast<double>(cost.runs * number);
     };
     TaskCosts costs = sizes_;
-    costs.route_seconds = of(TaskKind::route) / static_cast<double>(points_);
-    costs.part_seconds = of(TaskKind::part) / static_cast<double>(points_);
-    costs.join_seconds = of(TaskKind::join) / static_cast<double>(options_.parts);
-    costs.shade_seconds = of(TaskKind::shade) / static_cast<double>(shaded_);
-    costs.collect_seconds = of(TaskKind::collect) / static_cast<double>(shaded_);
+    costs.route_seconds = over(building_.at(TaskKind::route), points_);
+    costs.part_seconds = over(building_.at(TaskKind::part), points_);
+    costs.join_seconds = over(building_.at(TaskKind::join), options_.parts);
+    costs.light_seconds = over(shading_.at(TaskKind::light), shaded_);
+    costs.batch_points = static_cast<double>(RelitPoints::kBatch);
+    costs.bounce_seconds = over(shading_.at(TaskKind::bounce),
+                                shaded_ + std::min<std::uint64_t>(shaded_, RelitPoints::kBatch));
+    costs.shade_seconds = over(shading_.at(TaskKind::shade), shaded_);
+    costs.collect_seconds = over(shading_.at(TaskKind::collect), shaded_);
     costs.start_seconds = kStartSeconds;
     costs.listed_seconds = kListedSeconds;
     return costs;
@@ -247,7 +264,7 @@ class FarmMeasurement {
   WorkDirectory folder_;
   RunOptions run_;
   Progress& progress_;
-  std::map<TaskKind, KindCost> kinds_;
+  KindCosts building_, shading_;  // of the city, and of the smaller one
   TaskCosts sizes_;
   std::uint64_t points_ = 0, routes_ = 1, shaded_ = 1;
 };
@@ -276,6 +293,8 @@ void play_all(FarmResult& result, const FarmBenchOptions& options) {
   const FarmLoad usual{.points = points,
                        .routes = points / kModelRoutePoints + 1,
                        .parts = points / kModelPartPoints + 1,
+                       .lit = true,
+                       .waves = 1,
                        .ranges = points / kModelRangePoints + 1};
   FarmHardware hardware = options.hardware;
   for (const std::uint64_t nodes : options.nodes) {
@@ -285,8 +304,9 @@ void play_all(FarmResult& result, const FarmBenchOptions& options) {
   hardware.nodes = options.nodes.back();
   for (const std::uint64_t parts : {500U, 2'000U, 5'000U, 10'000U}) {
     for (const std::uint64_t routes : {1'000U, 10'000U, 25'000U}) {
-      const FarmLoad load{
-          .points = points, .routes = routes, .parts = parts, .ranges = usual.ranges};
+      FarmLoad load = usual;
+      load.routes = routes;
+      load.parts = parts;
       result.by_parts.push_back(model_row(load, costs, hardware));
     }
   }

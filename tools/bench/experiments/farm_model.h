@@ -17,14 +17,16 @@ namespace ptc::bench {
 struct TaskCosts {
   double route_seconds = 0, part_seconds = 0;     ///< of CPU, a point
   double join_seconds = 0;                        ///< of CPU, a part
+  double light_seconds = 0, bounce_seconds = 0;   ///< of CPU, a point
   double shade_seconds = 0, collect_seconds = 0;  ///< of CPU, a point
-  double start_seconds = 0;                       ///< of CPU, to start the program of a task
-  double listed_seconds = 0;                      ///< of CPU, to read the plan, for each task in it
-  double source_bytes = 0;                        ///< of the input, a point
-  double row_bytes = 0;                           ///< between route and part, a point
-  double stored_bytes = 0;                        ///< of the container, a point
-  double edge_bytes = 0;                          ///< that the join reads, a part
-  double shade_bytes = 0;                         ///< of the result of a range, a point
+  double batch_points = 0;   ///< that a bounce lights together: a part has foreign ones at its ends
+  double start_seconds = 0;  ///< of CPU, to start the program of a task
+  double listed_seconds = 0;  ///< of CPU, to read the plan, for each task in it
+  double source_bytes = 0;    ///< of the input, a point
+  double row_bytes = 0;       ///< between route and part, a point
+  double stored_bytes = 0;    ///< of the container, a point
+  double edge_bytes = 0;      ///< that the join reads, a part
+  double shade_bytes = 0;     ///< of the result of a range, a point
 };
 
 /// The machines and what they share.
@@ -38,23 +40,26 @@ struct FarmHardware {
   double slow_factor = 3;               ///< of the time of these
 };
 
-/// What is built.
+/// What is built, and what of its points.
 struct FarmLoad {
   std::uint64_t points = 0, routes = 1, parts = 1;
+  bool lit = false;          ///< each part by the whole scene
+  std::uint64_t waves = 0;   ///< bounces that all points get before they are shaded
   std::uint64_t ranges = 1;  ///< in which the points are shaded
+  bool collected = false;    ///< in one file; otherwise each range has a file of its own
 };
 
 /// What a run takes.
 struct FarmTimes {
-  /// Seconds until a stage ends, after the one before.
-  double route = 0, part = 0, join = 0, shade = 0, collect = 0;
+  /// Seconds until a stage ends, after the one before. Light and bounces include their joins.
+  double route = 0, part = 0, join = 0, light = 0, bounce = 0, shade = 0, collect = 0;
   double cpu_seconds = 0;  ///< of all tasks
   double moved_bytes = 0;  ///< over the file system
   double opened = 0;       ///< files that are looked for or opened
   std::string limit;       ///< what most of the time is due to
 
   [[nodiscard]] double built() const noexcept { return route + part + join; }
-  [[nodiscard]] double total() const noexcept { return route + part + join + shade + collect; }
+  [[nodiscard]] double total() const noexcept { return built() + light + bounce + shade + collect; }
 };
 
 /// Plays a run: tasks of a stage start in their order, on the core that is free first.
@@ -62,7 +67,7 @@ struct FarmTimes {
 [[nodiscard]] FarmTimes play(const FarmLoad& load, const TaskCosts& costs,
                              const FarmHardware& hardware);
 
-/// Returns the bytes of a plan, in which each part lists the routes and each task its command.
+/// Returns the bytes of a plan, which has a text for each input and for each task.
 [[nodiscard]] double plan_bytes(const FarmLoad& load) noexcept;
 
 }  // namespace ptc::bench
