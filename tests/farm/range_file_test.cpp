@@ -105,6 +105,34 @@ TEST_CASE("range file: the points of each range come in the order of the input",
   CHECK(all == points.records.size());
 }
 
+TEST_CASE("range file: keys of a range are sampled evenly over its files", "[farm][range_file]") {
+  const TemporaryDirectory dir;
+  const Points points = some_points(5'000);
+  const std::vector<MortonKey> cuts = cuts_of(points, 3);
+  write(dir / "a", points, cuts);
+  write(dir / "b", points, cuts);
+  const std::uint64_t every = GENERATE(1U, 7U, 64U, 1000U, 20000U);
+  std::vector<MortonKey> wanted;
+  for (const PointRecord& point : points.records) {
+    if (std::ranges::upper_bound(cuts, point.key) - cuts.begin() == 1) wanted.push_back(point.key);
+  }
+  // Blocks of 64 points: a piece is what is left of its block, and each twelfth key of it is taken
+  std::vector<MortonKey> expected;
+  std::uint64_t at = 0;
+  for (unsigned file = 0; file < 2; ++file) {
+    for (; at < wanted.size(); at += every) {
+      const std::uint64_t end = std::min<std::uint64_t>(at / 64 * 64 + 64, wanted.size());
+      for (std::uint64_t i = at; i < end; i += 12) expected.push_back(wanted[i]);
+    }
+    at -= wanted.size();
+  }
+  std::vector<MortonKey> keys;
+  RangeReader first(dir / "a", kPlan, kRow), second(dir / "b", kPlan, kRow);
+  const std::uint64_t ahead = first.sample_keys(1, 0, every, keys);
+  CHECK(second.sample_keys(1, ahead, every, keys) == at);
+  CHECK(keys == expected);
+}
+
 TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refused by name",
           "[farm][range_file]") {
   const TemporaryDirectory dir;

@@ -239,17 +239,12 @@ class Part {
 
   /// Returns keys of points that are spread over the range, for the splitters of the sort.
   [[nodiscard]] std::vector<MortonKey> keys_of_range(std::uint64_t points) const {
-    constexpr std::uint64_t kKeys = 1 << 14;
+    constexpr std::uint64_t kPieces = 512;
     if (points * 2 * sizeof(PointRecord) <= run_.memory_bytes / 4) return {};  // all fit in memory
     std::vector<MortonKey> keys;
-    for (const auto& route : routes_) {
-      RangeReader reader = open(route);
-      reader.open(range());
-      while (reader.next()) {
-        for (std::size_t i = 0; i < reader.block().size(); i += points / kKeys + 1)
-          keys.push_back(reader.block()[i].key);
-      }
-    }
+    std::uint64_t first = 0;
+    for (const auto& route : routes_)
+      first = open(route).sample_keys(range(), first, points / kPieces + 1, keys);
     return keys;
   }
 

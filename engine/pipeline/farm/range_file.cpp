@@ -207,6 +207,29 @@ bool RangeReader::next() {
   return true;
 }
 
+std::uint64_t RangeReader::sample_keys(std::uint32_t range, std::uint64_t first,
+                                       std::uint64_t every, std::vector<MortonKey>& keys) {
+  constexpr std::uint64_t kPiece = 384;  // points that are read together
+  constexpr std::size_t kStep = 12;      // from one key to the next
+  for (const RangeBlock& block : blocks_) {
+    if (block.range != range) continue;
+    for (; first < block.points; first += every) {
+      const auto count = static_cast<std::size_t>(std::min(kPiece, block.points - first));
+      const DirectRange piece(block.offset + first * sizeof(PointRecord),
+                              count * sizeof(PointRecord));
+      if (bytes_.size() < piece.whole) bytes_ = Arena(piece.whole);
+      file_.read_at(piece.begin, {bytes_.data(), piece.whole});
+      for (std::size_t i = 0; i < count; i += kStep) {
+        PointRecord record;
+        std::memcpy(&record, bytes_.data() + piece.lead + i * sizeof record, sizeof record);
+        keys.push_back(record.key);
+      }
+    }
+    first -= block.points;
+  }
+  return first;
+}
+
 void RangeReader::values(std::size_t group, std::vector<PointRecord>& records) const {
   const std::size_t count = points_.size(), bytes = row_.group_bytes[group];
   const std::byte* from = bytes_.data() + count * sizeof(PointRecord);

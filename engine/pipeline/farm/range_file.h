@@ -99,6 +99,13 @@ class RangeReader {
   [[nodiscard]] bool next();
   /// The points of the block.
   [[nodiscard]] std::span<const PointRecord> block() const noexcept { return points_; }
+  /// Appends keys of a range from pieces of its blocks, without checking these: to know about how
+  /// the points are spread, a part need not be read twice.
+  /// @param first  points from the first one of the range to the first piece
+  /// @param every  points from one piece to the next, 1 or more
+  /// @return       points from the end of the range to the next piece: `first` for another file
+  [[nodiscard]] std::uint64_t sample_keys(std::uint32_t range, std::uint64_t first,
+                                          std::uint64_t every, std::vector<MortonKey>& keys);
   /// Writes the values of a group into records that have the keys of the block's points.
   void values(std::size_t group, std::vector<PointRecord>& records) const;
 

@@ -18,7 +18,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -113,7 +116,7 @@ std::uint64_t count_blocks(const Layout& layout) {
 
 // Takes as many blocks as give the count at the usual spacing; where the last block brings far too
 // many points, a slightly wider spacing.
-Layout lay_out(std::uint64_t count) {
+Layout find_layout(std::uint64_t count) {
   // Count blocks until they have enough points.
   Layout layout;
   std::uint64_t have = 0;
@@ -134,6 +137,16 @@ Layout lay_out(std::uint64_t count) {
     have = count_blocks(layout);
   }
   return layout;
+}
+
+// Keeps the last layout: to count the blocks of a large city takes tens of milliseconds, and a task
+// of a farm asks for their number before it makes some of them.
+Layout lay_out(std::uint64_t count) {
+  static std::mutex mutex;
+  static std::optional<std::pair<std::uint64_t, Layout>> last;
+  const std::lock_guard lock(mutex);
+  if (!last || last->first != count) last = {count, find_layout(count)};
+  return last->second;
 }
 
 constexpr glm::vec3 kToSun(0.45f, 0.84f, 0.3f);
