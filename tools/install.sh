@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Installs the packages of packages.txt that are missing. It asks no questions. When nothing is
-# missing it changes nothing and needs no network.
+# Installs the packages of packages.txt, and those that it is given, where they are missing. It asks
+# no questions. When nothing is missing it changes nothing and needs no network.
 set -euo pipefail
 
 missing=()
-for package in $(<"$(dirname "$0")/packages.txt"); do
+for package in $(<"$(dirname "$0")/packages.txt") "$@"; do
   state=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $state == installed ]] || missing+=("$package")
 done

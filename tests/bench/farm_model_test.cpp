@@ -68,9 +68,9 @@ TEST_CASE("farm model: what is shared is divided among those who use it", "[benc
   hardware = free_of_limits(1, 1);
   hardware.open_seconds = 1e-3;
   const FarmTimes opening = play(kLoad, costs, hardware);
-  CHECK(opening.part == Approx(20 * (4 + 2 * 10) * 1e-3));
+  CHECK(opening.part == Approx(20 * (4 + 4 * 10) * 1e-3));
   CHECK(opening.limit == "opening files");
-  CHECK(opening.opened == Approx(10 * 4 + 20 * 24 + (4 + 40 + 10) + (4 + 20) + (4 + 1)));
+  CHECK(opening.opened == Approx(10 * 4 + 20 * 44 + (4 + 40 + 10) + (4 + 20) + (4 + 1)));
 }
 
 TEST_CASE("farm model: tasks that come one by one do not share what they use", "[bench][farm]") {
@@ -114,10 +114,12 @@ TEST_CASE("farm model: parts are lit and get their bounces one wave after anothe
   CHECK(times.cpu_seconds == Approx(built.cpu_seconds + 41 + 2 * 101));
   TaskCosts with_ends = costs;
   with_ends.batch_points = 10'000;  // at 19 borders, over 20 parts
+  CHECK(play(load, with_ends, free_of_limits(1, 4)).light == Approx(10 * 1.19 + 1));
   CHECK(play(load, with_ends, free_of_limits(1, 4)).bounce == Approx(2 * (25 * 1.19 + 1)));
   const double plans = 96 * plan_bytes(load) - 33 * plan_bytes(kLoad);
   CHECK(times.moved_bytes == Approx(built.moved_bytes + 3 * (60e6 + 40'000) + plans));
-  CHECK(times.opened == Approx(built.opened + 3 * (20 * 24 + 44)));
+  // The second wave and the ranges see the scene, and the one with the light of the bounce before
+  CHECK(times.opened == Approx(built.opened + 2 * 20 * 24 + 20 * 44 + 3 * 44 + 20));
 }
 
 TEST_CASE("farm model: ranges are shaded beside each other, and may be collected by one",

@@ -41,9 +41,10 @@ Points some_points(std::size_t count) {
   return points;
 }
 
+/// @param block  points of a block
 void write(const std::filesystem::path& path, const Points& points,
-           const std::vector<MortonKey>& cuts) {
-  RangeWriter writer(path, kPlan, cuts, kRow, RangeWriter::least_memory(cuts.size() + 1, kRow));
+           const std::vector<MortonKey>& cuts, std::uint64_t block = 64) {
+  RangeWriter writer(path, kPlan, cuts, kRow, (cuts.size() + 3) * block * kRow.bytes());
   for (std::size_t at = 0; at < points.records.size(); at += 100) {
     const std::size_t count = std::min<std::size_t>(100, points.records.size() - at);
     std::vector<std::vector<PointRecord>> values;
@@ -54,6 +55,10 @@ void write(const std::filesystem::path& path, const Points& points,
     writer.add(std::span(points.records).subspan(at, count), values);
   }
   writer.finish();
+}
+
+RangeReader open(const std::filesystem::path& path, std::uint32_t range) {
+  return {path, kRow, read_range(path, kPlan, kRow, range)};
 }
 
 std::vector<MortonKey> cuts_of(const Points& points, std::size_t parts) {
@@ -72,7 +77,6 @@ TEST_CASE("range file: the points of each range come in the order of the input",
   const Points points = some_points(5'000);
   const std::vector<MortonKey> cuts = cuts_of(points, 5);
   write(dir / "route", points, cuts);
-  RangeReader reader(dir / "route", kPlan, kRow);
   std::size_t all = 0;
   for (std::uint32_t range = 0; range < 5; ++range) {
     std::vector<std::size_t> wanted;
@@ -80,8 +84,7 @@ TEST_CASE("range file: the points of each range come in the order of the input",
       if (std::ranges::upper_bound(cuts, points.records[i].key) - cuts.begin() == range)
         wanted.push_back(i);
     }
-    CHECK(reader.points(range) == wanted.size());
-    reader.open(range);
+    RangeReader reader = open(dir / "route", range);
     std::size_t at = 0;
     std::vector<PointRecord> values;
     while (reader.next()) {
@@ -109,27 +112,27 @@ TEST_CASE("range file: keys of a range are sampled evenly over its files", "[far
   const TemporaryDirectory dir;
   const Points points = some_points(5'000);
   const std::vector<MortonKey> cuts = cuts_of(points, 3);
-  write(dir / "a", points, cuts);
-  write(dir / "b", points, cuts);
-  const std::uint64_t every = GENERATE(1U, 7U, 64U, 1000U, 20000U);
+  const std::uint64_t block = GENERATE(64U, 1000U), every = GENERATE(1U, 7U, 64U, 1000U, 20000U);
+  write(dir / "a", points, cuts, block);
+  write(dir / "b", points, cuts, block);
   std::vector<MortonKey> wanted;
   for (const PointRecord& point : points.records) {
     if (std::ranges::upper_bound(cuts, point.key) - cuts.begin() == 1) wanted.push_back(point.key);
   }
-  // Blocks of 64 points: a piece is what is left of its block, and each twelfth key of it is taken
+  // A piece has 96 points, or what is left of its block; each twelfth key of it is taken
   std::vector<MortonKey> expected;
   std::uint64_t at = 0;
   for (unsigned file = 0; file < 2; ++file) {
     for (; at < wanted.size(); at += every) {
-      const std::uint64_t end = std::min<std::uint64_t>(at / 64 * 64 + 64, wanted.size());
+      const std::uint64_t end =
+          std::min<std::uint64_t>({at + 96, at / block * block + block, wanted.size()});
       for (std::uint64_t i = at; i < end; i += 12) expected.push_back(wanted[i]);
     }
     at -= wanted.size();
   }
   std::vector<MortonKey> keys;
-  RangeReader first(dir / "a", kPlan, kRow), second(dir / "b", kPlan, kRow);
-  const std::uint64_t ahead = first.sample_keys(1, 0, every, keys);
-  CHECK(second.sample_keys(1, ahead, every, keys) == at);
+  const std::uint64_t ahead = open(dir / "a", 1).sample_keys(0, every, keys);
+  CHECK(open(dir / "b", 1).sample_keys(ahead, every, keys) == at);
   CHECK(keys == expected);
 }
 
@@ -140,10 +143,9 @@ TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refus
   write(dir / "route", points, cuts_of(points, 2));
   const std::vector<char> whole = bytes_of(dir / "route");
   const auto read = [&] {
-    RangeReader reader(dir / "route", kPlan, kRow);
     std::size_t count = 0;
     for (std::uint32_t range = 0; range < 2; ++range) {
-      reader.open(range);
+      RangeReader reader = open(dir / "route", range);
       while (reader.next()) count += reader.block().size();
     }
     return count;
@@ -171,7 +173,7 @@ TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refus
     CHECK_THROWS_AS(read(), DataError);
   }
   change(whole);
-  CHECK_THROWS_WITH(RangeReader(dir / "route", kPlan + 1, kRow),
+  CHECK_THROWS_WITH(read_range(dir / "route", kPlan + 1, kRow, 0),
                     Catch::Contains("of another plan"));
 }
 
@@ -182,8 +184,7 @@ TEST_CASE("range file: a point that no container can hold is refused by name",
     Points points = some_points(50);
     change(points.records[20]);
     write(dir / "route", points, {});
-    RangeReader reader(dir / "route", kPlan, kRow);
-    reader.open(0);
+    RangeReader reader = open(dir / "route", 0);
     CHECK_THROWS_WITH(reader.next(), Catch::Contains((dir / "route").string()) &&
                                          Catch::Contains("point 20: radius, radiance"));
   };
@@ -226,7 +227,7 @@ TEST_CASE("range file: blocks behind the end, with checksums that fit, are refus
       OutputFile file(path);
       file.append(changed);
       file.publish();
-      CHECK_THROWS_WITH(RangeReader(path, kPlan, kRow), Catch::Contains("out of range"));
+      CHECK_THROWS_WITH(read_range(path, kPlan, kRow, 0), Catch::Contains("out of range"));
     }
   }
 }

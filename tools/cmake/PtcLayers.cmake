@@ -48,13 +48,20 @@ endif()
 
 # ptc_compile_together(<target> <number>) compiles files in groups of that number: most of the time of each went to
 # headers and templates that all of them need. Only for Release: the other presets compile each file alone, and find
-# what one includes too little. Kernels, which include themselves once for each instruction set, and experiments, whose
-# tables have the same names, stay alone.
+# what one includes too little. Sources that include themselves once for each instruction set stay alone, and so do
+# experiments, whose tables have the same names.
 function(ptc_compile_together target number)
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
-    get_target_property(alone ${target} SOURCES)
-    list(FILTER alone INCLUDE REGEX "kernels|_experiment\\.cpp$")
-    set_source_files_properties(${alone} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    get_target_property(sources ${target} SOURCES)
+    foreach(source IN LISTS sources)
+      set(many)
+      if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${source})
+        file(STRINGS ${source} many REGEX "HWY_TARGET_INCLUDE")
+      endif()
+      if(many OR source MATCHES "_experiment\\.cpp$")
+        set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+      endif()
+    endforeach()
     set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${number})
   endif()
 endfunction()

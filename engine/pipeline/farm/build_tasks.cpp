@@ -179,8 +179,7 @@ class Part {
 
   /// Builds the part. @return  whether it has points; one without has no file
   [[nodiscard]] bool run() {
-    open_routes();
-    const std::uint64_t points = count();
+    const std::uint64_t points = find();
     if (points == 0) {  // a scene has no part without points
       remove_part(target_);
       return false;
@@ -194,19 +193,27 @@ class Part {
   }
 
  private:
-  void open_routes() {
-    for (std::size_t i = 0; i < plan_.inputs.size(); ++i)
-      routes_.push_back(plan_.output({TaskKind::route}, i));
-  }
+  /// The points of the part that a task has routed.
+  struct Routed {
+    std::filesystem::path path;
+    std::vector<RangeBlock> blocks;
+  };
 
-  [[nodiscard]] RangeReader open(const std::filesystem::path& route) const {
-    return {route, plan_.id, plan_.row()};
-  }
-
-  [[nodiscard]] std::uint64_t count() const {
+  /// Finds the points of the part in the files of the routes.
+  /// @return  their number
+  [[nodiscard]] std::uint64_t find() {
     std::uint64_t points = 0;
-    for (const auto& route : routes_) points += open(route).points(range());
+    for (std::size_t i = 0; i < plan_.inputs.size(); ++i) {
+      Routed route{.path = plan_.output({TaskKind::route}, i), .blocks = {}};
+      route.blocks = read_range(route.path, plan_.id, plan_.row(), range());
+      for (const RangeBlock& block : route.blocks) points += block.points;
+      if (!route.blocks.empty()) routes_.push_back(std::move(route));
+    }
     return points;
+  }
+
+  [[nodiscard]] RangeReader open(const Routed& route) const {
+    return {route.path, plan_.row(), route.blocks};
   }
 
   [[nodiscard]] std::uint32_t range() const { return static_cast<std::uint32_t>(number_); }
@@ -223,9 +230,8 @@ class Part {
     sorts_.emplace(attributes_, options, std::span<const std::filesystem::path>(), executor_,
                    sample);
     std::vector<PointRecord> values;
-    for (const auto& route : routes_) {
+    for (const Routed& route : routes_) {
       RangeReader reader = open(route);
-      reader.open(range());
       while (reader.next()) {
         sorter_->add(reader.block());
         for (std::size_t group = 0; group < groups; ++group) {
@@ -239,12 +245,12 @@ class Part {
 
   /// Returns keys of points that are spread over the range, for the splitters of the sort.
   [[nodiscard]] std::vector<MortonKey> keys_of_range(std::uint64_t points) const {
-    constexpr std::uint64_t kPieces = 512;
+    constexpr std::uint64_t kPieces = 2048;
     if (points * 2 * sizeof(PointRecord) <= run_.memory_bytes / 4) return {};  // all fit in memory
     std::vector<MortonKey> keys;
     std::uint64_t first = 0;
-    for (const auto& route : routes_)
-      first = open(route).sample_keys(range(), first, points / kPieces + 1, keys);
+    for (const Routed& route : routes_)
+      first = open(route).sample_keys(first, points / kPieces + 1, keys);
     return keys;
   }
 
@@ -299,7 +305,7 @@ class Part {
   const ThreadPool executor_;
   Progress& progress_;
   AttributePlan attributes_;
-  std::vector<std::filesystem::path> routes_;
+  std::vector<Routed> routes_;  // those that have points of the part
   std::unique_ptr<ExternalSorter> sorter_;
   std::optional<AttributeSorts> sorts_;
 };

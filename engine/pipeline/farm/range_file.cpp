@@ -138,8 +138,8 @@ void RangeWriter::finish() {
   sync_directory(target_);
 }
 
-RangeReader::RangeReader(const std::filesystem::path& path, std::uint64_t plan, RangeRow row)
-    : path_(path), file_(path, DirectFile::Kept::found), row_(std::move(row)) {
+std::vector<RangeBlock> read_range(const std::filesystem::path& path, std::uint64_t plan,
+                                   const RangeRow& row, std::uint32_t range) {
   const std::string name = path.string();
   const auto require = [&](bool holds, const char* what) {
     if (!holds) throw DataError(name + ": " + what);
@@ -161,29 +161,27 @@ RangeReader::RangeReader(const std::filesystem::path& path, std::uint64_t plan, 
   require(xxh3_64(bytes) == xxh3, "the table of the file is damaged");
   StateReader table(bytes, name, offset);
   require(table.get<std::uint64_t>() == plan, "the file is of another plan");
+  std::vector<RangeBlock> blocks;
   for (std::uint64_t left = table.get_count(length); left > 0; --left) {
-    RangeBlock& block = blocks_.emplace_back();
+    RangeBlock block;
     block.range = table.get<std::uint32_t>();
     block.offset = table.get_count(offset);
-    block.points = table.get_count((offset - block.offset) / row_.bytes());
+    block.points = table.get_count((offset - block.offset) / row.bytes());
     block.xxh3 = table.get<std::uint64_t>();
+    if (block.range == range) blocks.push_back(block);
   }
   table.end();
+  return blocks;
 }
 
-std::uint64_t RangeReader::points(std::uint32_t range) const {
-  std::uint64_t points = 0;
-  for (const RangeBlock& block : blocks_) points += block.range == range ? block.points : 0;
-  return points;
-}
-
-void RangeReader::open(std::uint32_t range) {
-  range_ = range;
-  at_ = 0;
-}
+RangeReader::RangeReader(const std::filesystem::path& path, RangeRow row,
+                         std::vector<RangeBlock> blocks)
+    : path_(path),
+      file_(path, DirectFile::Kept::found),
+      row_(std::move(row)),
+      blocks_(std::move(blocks)) {}
 
 bool RangeReader::next() {
-  while (at_ < blocks_.size() && blocks_[at_].range != range_) ++at_;
   if (at_ == blocks_.size()) return false;
   const RangeBlock& block = blocks_[at_++];
   const auto count = static_cast<std::size_t>(block.points);
@@ -207,12 +205,12 @@ bool RangeReader::next() {
   return true;
 }
 
-std::uint64_t RangeReader::sample_keys(std::uint32_t range, std::uint64_t first,
-                                       std::uint64_t every, std::vector<MortonKey>& keys) {
-  constexpr std::uint64_t kPiece = 384;  // points that are read together
-  constexpr std::size_t kStep = 12;      // from one key to the next
+std::uint64_t RangeReader::sample_keys(std::uint64_t first, std::uint64_t every,
+                                       std::vector<MortonKey>& keys) {
+  constexpr std::uint64_t kPiece = 96;  // points that are read together
+  constexpr std::size_t kStep = 12;     // from one key to the next
+  points_.clear();
   for (const RangeBlock& block : blocks_) {
-    if (block.range != range) continue;
     for (; first < block.points; first += every) {
       const auto count = static_cast<std::size_t>(std::min(kPiece, block.points - first));
       const DirectRange piece(block.offset + first * sizeof(PointRecord),

@@ -84,37 +84,40 @@ class RangeWriter {
   std::future<void> writing_;  ///< last, so that its end is awaited before the other members go
 };
 
+/// Returns the blocks of a range, in the order of the file. This reads the table of all blocks.
+/// @throws DataError when the file is damaged or of another plan; std::system_error
+[[nodiscard]] std::vector<RangeBlock> read_range(const std::filesystem::path& path,
+                                                 std::uint64_t plan, const RangeRow& row,
+                                                 std::uint32_t range);
+
 /// Reads the points of one range.
 class RangeReader {
  public:
-  /// @throws DataError when the file is damaged or of another plan; std::system_error
-  RangeReader(const std::filesystem::path& path, std::uint64_t plan, RangeRow row);
+  /// @param blocks  of read_range()
+  /// @throws std::system_error
+  RangeReader(const std::filesystem::path& path, RangeRow row, std::vector<RangeBlock> blocks);
 
-  /// Returns the number of points of a range.
-  [[nodiscard]] std::uint64_t points(std::uint32_t range) const;
-  /// Starts to read a range.
-  void open(std::uint32_t range);
   /// Reads the next block of the range. @return whether there was one
   /// @throws DataError when it is damaged, or has a point that a container cannot hold
   [[nodiscard]] bool next();
   /// The points of the block.
   [[nodiscard]] std::span<const PointRecord> block() const noexcept { return points_; }
-  /// Appends keys of a range from pieces of its blocks, without checking these: to know about how
-  /// the points are spread, a part need not be read twice.
-  /// @param first  points from the first one of the range to the first piece
-  /// @param every  points from one piece to the next, 1 or more
-  /// @return       points from the end of the range to the next piece: `first` for another file
-  [[nodiscard]] std::uint64_t sample_keys(std::uint32_t range, std::uint64_t first,
-                                          std::uint64_t every, std::vector<MortonKey>& keys);
   /// Writes the values of a group into records that have the keys of the block's points.
   void values(std::size_t group, std::vector<PointRecord>& records) const;
+
+  /// Appends keys from pieces of the blocks, without checking these: to know about how the points
+  /// are spread, a part need not read all of them. There is no block afterwards.
+  /// @param first  points from the first one to the first piece
+  /// @param every  points from one piece to the next, 1 or more
+  /// @return       points from the end of the range to the next piece: `first` for another file
+  [[nodiscard]] std::uint64_t sample_keys(std::uint64_t first, std::uint64_t every,
+                                          std::vector<MortonKey>& keys);
 
  private:
   std::filesystem::path path_;
   DirectFile file_;
   RangeRow row_;
   std::vector<RangeBlock> blocks_;
-  std::uint32_t range_ = 0;
   std::size_t at_ = 0;
   Arena bytes_;
   std::vector<PointRecord> points_;

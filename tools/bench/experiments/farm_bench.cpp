@@ -164,24 +164,35 @@ class FarmMeasurement {
       city.city_points = options_.shaded;
       LightRequest sun;
       sun.lights.emplace().suns.push_back({.to_sun = glm::normalize(glm::vec3(1, 2, 1))});
-      FarmShading shading{.target = folder_.path() / "shaded.ply", .request = {}, .ranges = 2};
+      FarmShading shading{.target = folder_.path() / "shaded.#.ply", .request = {}, .ranges = 2};
       shading.request.bounces = 2;
       const FarmPlan plan = plan_city(city, 2, shading, sun);
-      for (const FarmTask& task : plan.tasks) {
-        if (task.number > 0) continue;  // its step has been run
-        if (task.step.kind == TaskKind::collect) note_shaded(plan);
-        run_timed(plan, task.step.kind, 1, shading_);
-      }
+      run_all(plan, shading_);
+      note_shaded(plan);
+      // Collect the points in one file, too: how well they are shaded makes no difference
+      shading.target = folder_.path() / "shaded.ply";
+      shading.request.bounces = 1;
+      shading.request.gather.solid_angle = 1;
+      run_all(plan_city(city, 2, shading), collecting_);
       progress_.advance(1);
     }
     progress_.end();
   }
 
+  /// Runs all tasks of a plan, step by step.
+  void run_all(const FarmPlan& plan, KindCosts& costs) const {
+    for (const FarmTask& task : plan.tasks) {
+      if (task.number == 0) run_timed(plan, task.step.kind, 1, costs);
+    }
+  }
+
   /// Notes what a point takes in the files of the ranges. @pre they are shaded
   void note_shaded(const FarmPlan& plan) {
     std::uint64_t bytes = 0;
-    for (std::size_t i = 0; i < 2; ++i)
-      bytes += std::filesystem::file_size(plan.output({TaskKind::shade}, i));
+    for (std::size_t i = 0; i < plan.shading->ranges; ++i) {
+      const std::filesystem::path file = plan.output({TaskKind::shade}, i);
+      if (std::filesystem::exists(file)) bytes += std::filesystem::file_size(file);  // has points
+    }
     shaded_ = ContainerReader(plan.scene).superblock().points;
     sizes_.shade_bytes = static_cast<double>(bytes) / static_cast<double>(shaded_);
   }
@@ -238,12 +249,13 @@ class FarmMeasurement {
     costs.route_seconds = over(building_.at(TaskKind::route), points_);
     costs.part_seconds = over(building_.at(TaskKind::part), points_);
     costs.join_seconds = over(building_.at(TaskKind::join), options_.parts);
-    costs.light_seconds = over(shading_.at(TaskKind::light), shaded_);
+    // Both parts light the batch in which one ends and the other begins
+    const std::uint64_t lit = shaded_ + std::min<std::uint64_t>(shaded_, RelitPoints::kBatch);
     costs.batch_points = static_cast<double>(RelitPoints::kBatch);
-    costs.bounce_seconds = over(shading_.at(TaskKind::bounce),
-                                shaded_ + std::min<std::uint64_t>(shaded_, RelitPoints::kBatch));
+    costs.light_seconds = over(shading_.at(TaskKind::light), lit);
+    costs.bounce_seconds = over(shading_.at(TaskKind::bounce), lit);
     costs.shade_seconds = over(shading_.at(TaskKind::shade), shaded_);
-    costs.collect_seconds = over(shading_.at(TaskKind::collect), shaded_);
+    costs.collect_seconds = over(collecting_.at(TaskKind::collect), shaded_);
     costs.start_seconds = kStartSeconds;
     costs.listed_seconds = kListedSeconds;
     return costs;
@@ -264,7 +276,7 @@ class FarmMeasurement {
   WorkDirectory folder_;
   RunOptions run_;
   Progress& progress_;
-  KindCosts building_, shading_;  // of the city, and of the smaller one
+  KindCosts building_, shading_, collecting_;  // of the city, and of the smaller one
   TaskCosts sizes_;
   std::uint64_t points_ = 0, routes_ = 1, shaded_ = 1;
 };
@@ -302,6 +314,9 @@ void play_all(FarmResult& result, const FarmBenchOptions& options) {
     result.by_nodes.push_back(model_row(usual, costs, hardware));
   }
   hardware.nodes = options.nodes.back();
+  FarmLoad collected = usual;
+  collected.collected = true;
+  result.collect_seconds = play(collected, costs, hardware).collect;
   for (const std::uint64_t parts : {500U, 2'000U, 5'000U, 10'000U}) {
     for (const std::uint64_t routes : {1'000U, 10'000U, 25'000U}) {
       FarmLoad load = usual;

@@ -51,6 +51,7 @@ struct FarmResult {
   std::vector<FarmRow> rows;
   TaskCosts costs;
   std::vector<FarmModelRow> by_nodes, by_parts;
+  double collect_seconds = 0;  ///< of the model, where all points are collected in one file
 };
 
 /// Builds the city in one run and in parts, by turns, compares what they hold, and plays the model

@@ -127,8 +127,7 @@ Report report_of(const FarmResult& result, const FarmBenchOptions& options) {
                 "here the city is made in memory.",
                 fmt::format("In the model each range writes a file of its own. Where they are "
                             "collected in one file, a last task takes {:.1f} hours more.",
-                            static_cast<double>(options.model_points) *
-                                result.costs.collect_seconds / 3600)},
+                            result.collect_seconds / 3600)},
       .figures = {{.chart = chart_of(result, options.model_points)}}};
 }
 

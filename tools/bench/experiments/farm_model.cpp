@@ -147,11 +147,13 @@ FarmTimes play(const FarmLoad& load, const TaskCosts& costs, const FarmHardware&
   };
   // Adds a task for each part of a scene that is there. It reads its own points, about as much of
   // the nodes around them, and writes the points; another one joins the parts.
-  const auto add_parts = [&](double& seconds, double point_seconds, double foreign) {
+  // The batches at the ends of its points are lit whole.
+  const double lit = points + (parts - 1) * costs.batch_points;
+  const auto add_parts = [&](double& seconds, double point_seconds, double scenes) {
     add(seconds, {.tasks = load.parts,
-                  .cpu_seconds = start + (points + foreign) / parts * point_seconds,
+                  .cpu_seconds = start + lit / parts * point_seconds,
                   .bytes = plan + points / parts * 3 * costs.stored_bytes + costs.edge_bytes,
-                  .opened = 4 + parts});
+                  .opened = 4 + scenes * parts});
     add(seconds, {.cpu_seconds = start + parts * costs.join_seconds,
                   .bytes = plan + parts * costs.edge_bytes,
                   .opened = 4 + 2 * parts});
@@ -166,19 +168,19 @@ FarmTimes play(const FarmLoad& load, const TaskCosts& costs, const FarmHardware&
       {.tasks = load.parts,
        .cpu_seconds = start + points / parts * costs.part_seconds,
        .bytes = plan + points / parts * (costs.row_bytes + costs.stored_bytes) + costs.edge_bytes,
-       .opened = 4 + 2 * routes});  // the mark of each route, and its file
+       .opened = 4 + 4 * routes});  // the mark of each, its table, its points twice
   add(times.join, {.cpu_seconds = start + parts * costs.join_seconds,
                    .bytes = plan + parts * costs.edge_bytes,
                    .opened = 4 + 2 * parts + routes});  // and it removes the files of the routes
 
   // Light and shade it
-  if (load.lit) add_parts(times.light, costs.light_seconds, 0);
-  for (std::uint64_t wave = 0; wave < load.waves; ++wave)
-    add_parts(times.bounce, costs.bounce_seconds, (parts - 1) * costs.batch_points);
+  if (load.lit) add_parts(times.light, costs.light_seconds, 1);
+  for (std::uint64_t wave = 0; wave < load.waves; ++wave)  // with the light of the one before
+    add_parts(times.bounce, costs.bounce_seconds, wave == 0 ? 1 : 2);
   add(times.shade, {.tasks = load.ranges,
                     .cpu_seconds = start + points / ranges * costs.shade_seconds,
                     .bytes = plan + points / ranges * (2 * costs.stored_bytes + costs.shade_bytes),
-                    .opened = 4 + parts});
+                    .opened = 4 + (load.waves == 0 ? 1 : 2) * parts});
   Stage collect{.cpu_seconds = start, .bytes = plan, .opened = 4 + ranges};
   if (load.collected) {
     collect.cpu_seconds += points * costs.collect_seconds;

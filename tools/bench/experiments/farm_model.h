@@ -19,8 +19,8 @@ struct TaskCosts {
   double join_seconds = 0;                        ///< of CPU, a part
   double light_seconds = 0, bounce_seconds = 0;   ///< of CPU, a point
   double shade_seconds = 0, collect_seconds = 0;  ///< of CPU, a point
-  double batch_points = 0;   ///< that a bounce lights together: a part has foreign ones at its ends
-  double start_seconds = 0;  ///< of CPU, to start the program of a task
+  double batch_points = 0;    ///< that are lit together: a part has foreign ones at its ends
+  double start_seconds = 0;   ///< of CPU, to start the program of a task
   double listed_seconds = 0;  ///< of CPU, to read the plan, for each task in it
   double source_bytes = 0;    ///< of the input, a point
   double row_bytes = 0;       ///< between route and part, a point
