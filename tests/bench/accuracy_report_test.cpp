@@ -1,7 +1,5 @@
 // JSON, CSV, text and charts of rows made by hand.
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include <catch2/catch.hpp>
 

@@ -1,8 +1,6 @@
 // JSON, CSV, text and the chart of errors made by hand.
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 
 #include <catch2/catch.hpp>
 

@@ -2,13 +2,12 @@
 #include "tools/bench/references/mitsuba.h"
 
 #include <cstring>
-#include <fstream>
-#include <sstream>
 #include <string>
 
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
+#include "tests/support/slurp.h"
 #include "tests/support/temporary_directory.h"
 #include "tools/bench/scenes/procedural.h"
 
@@ -16,13 +15,6 @@ using namespace ptc;
 using namespace ptc::bench;
 
 namespace {
-
-std::string content(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::stringstream all;
-  all << in.rdbuf();
-  return all.str();
-}
 
 std::size_t count_of(const std::string& text, const std::string& word) {
   std::size_t count = 0;
@@ -40,7 +32,7 @@ TEST_CASE("Mitsuba: its scene has every material that is used, the lamp, and the
   scene.lights.suns.push_back({.to_sun = {0, 1, 0}, .irradiance = {3, 2, 1}});
   scene.lights.sky.radiance = {0.5F, 0.25F, 0.125F};
   write_mitsuba_scene(dir.path(), scene.mesh, scene.lights, scene.camera);
-  const std::string text = content(dir / "scene.xml");
+  const std::string text = slurp(dir / "scene.xml");
   CHECK(count_of(text, "<shape type=\"ply\">") == 4);
   CHECK(count_of(text, "<bsdf type=\"twosided\">") == 4);
   CHECK(count_of(text, "<emitter type=\"area\"><rgb name=\"radiance\" value=\"17, 12, 4\"/>") == 1);
@@ -63,7 +55,7 @@ TEST_CASE("Mitsuba: a PLY has the triangles of its material where they stand", "
   mesh.materials.resize(3);
   write_mitsuba_scene(dir.path(), mesh, {}, {});
   CHECK(dir.listing() == "0.ply 1.ply scene.xml");
-  const std::string ply = content(dir / "1.ply"), end = "end_header\n";
+  const std::string ply = slurp(dir / "1.ply"), end = "end_header\n";
   CHECK(ply.find("element vertex 6\n") != std::string::npos);
   CHECK(ply.find("element face 2\n") != std::string::npos);
   const std::size_t at = ply.find(end) + end.size();

@@ -2,7 +2,6 @@
 #include "tools/bench/report/results.h"
 
 #include <fstream>
-#include <sstream>
 
 #include <catch2/catch.hpp>
 

@@ -1,8 +1,6 @@
 #include "tests/io/files.h"
 
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include "engine/base/error.h"

@@ -10,7 +10,8 @@
 
 #include "engine/io/image/image.h"
 #include "engine/io/image/srgb.h"
-#include "tests/io/files.h"
+#include "tests/support/slurp.h"
+#include "tests/support/temporary_directory.h"
 
 using namespace ptc;
 using Catch::Matchers::Contains;

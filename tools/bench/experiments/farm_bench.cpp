@@ -249,7 +249,7 @@ class FarmMeasurement {
     costs.route_seconds = over(building_.at(TaskKind::route), points_);
     costs.part_seconds = over(building_.at(TaskKind::part), points_);
     costs.join_seconds = over(building_.at(TaskKind::join), options_.parts);
-    // Both parts light the batch in which one ends and the other begins
+    // The batch of points in which the first part ends and the second begins is lit by both tasks.
     const std::uint64_t lit = shaded_ + std::min<std::uint64_t>(shaded_, RelitPoints::kBatch);
     costs.batch_points = static_cast<double>(RelitPoints::kBatch);
     costs.light_seconds = over(shading_.at(TaskKind::light), lit);

@@ -11,7 +11,8 @@
 namespace ptc::bench {
 namespace {
 
-// Of the plan; measured with 9,009 tasks, and with 5 and 2,000 inputs
+// Bytes of the file of a plan. A task takes 496, as measured with 9,009 of them. An input of the
+// city takes 127, one with 12 channels 3,066; the model assumes 250.
 constexpr double kTaskBytes = 496, kInputBytes = 250;
 
 double tasks_of(const FarmLoad& load) {
