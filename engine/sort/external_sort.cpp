@@ -11,20 +11,9 @@
 #include "engine/sort/bucket_stream.h"
 #include "engine/sort/point_streams.h"
 #include "engine/sort/radix_sort.h"
-#include "format/checksum.h"
 
 namespace ptc {
 namespace {
-
-using Digest = std::array<std::uint64_t, 2>;
-
-Digest sum(const Digest& a, const Digest& b) noexcept {
-  return {a[0] + b[0], a[1] + b[1]};
-}
-
-Digest digest_of(std::span<const PointRecord> records) noexcept {
-  return xxh3_128_sum(std::as_bytes(records), sizeof(PointRecord));
-}
 
 // All in memory: one block.
 class MemoryStream final : public BlockStream {
@@ -52,11 +41,8 @@ ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& execu
       arena_(2 * plan_.run_records * sizeof(PointRecord)),
       kept_(!options.kept_files.empty()) {
   if (kept_) file_ = SpillFile::named(options.kept_files);
-  const std::size_t stride = sample.size() / plan_.sample_keys + 1;
-  for (std::size_t i = 0; i < sample.size(); i += stride) sample_.push_back(sample[i]);
-  const bool will_spill = expected_spill() > 0;
-  filling_ = will_spill ? part(0) : memory().first(plan_.run_records);
-  if (!will_spill) return;
+  begin(sample);
+  if (expected_spill() == 0) return;
   // Better now than after an hour of partitioning. A little more may be expected than comes.
   require_room(
       options.temp_dirs, expected_spill() / 100 * 95,
@@ -76,6 +62,34 @@ ExternalSorter::ExternalSorter(const SortOptions& options, const Executor& execu
   for (std::size_t range = 0; range < partition_->ranges(); ++range)
     found += partition_->size(range);
   kept.require(found == points_, "the temporary files do not hold as many points as were added");
+}
+
+// Records that will not fit in memory are spilled from the first part on.
+void ExternalSorter::begin(std::span<const MortonKey> sample) {
+  sample_.clear();
+  const std::size_t stride = sample.size() / plan_.sample_keys + 1;
+  for (std::size_t i = 0; i < sample.size(); i += stride) sample_.push_back(sample[i]);
+  filling_ = expected_spill() > 0 ? part(0) : memory().first(plan_.run_records);
+}
+
+void ExternalSorter::restart(std::uint64_t expected, std::span<const MortonKey> sample) {
+  if (!options_.restarts || kept_) throw std::invalid_argument("ExternalSorter::restart");
+  grouping_ = {};  // this awaits the end of what goes on, before what it uses goes
+  writing_ = {};
+  partition_ = nullptr;
+  file_.reset();
+  options_.expected = expected;
+  filled_ = 0;
+  points_ = 0;
+  digest_ = {};
+  finished_ = false;
+  buckets_ = 0;
+  turn_ = 0;
+  begin(sample);
+}
+
+void ExternalSorter::release_memory() noexcept {
+  if (!options_.restarts) arena_ = Arena();
 }
 
 std::span<PointRecord> ExternalSorter::memory() noexcept {
@@ -117,7 +131,7 @@ void ExternalSorter::add(std::span<const PointRecord> records) {
 void ExternalSorter::take(std::span<const PointRecord> records) {
   constexpr std::size_t kGrain = 1 << 14, kInCache = 1 << 9;
   const std::span<PointRecord> to = filling_.subspan(filled_, records.size());
-  std::vector<Digest> digests(records.size() / kGrain + 1);
+  std::vector<RecordsDigest> digests(records.size() / kGrain + 1);
   executor_.for_ranges(records.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t at = begin; at < end; at += kInCache) {
       const auto some = records.subspan(at, std::min(kInCache, end - at));
@@ -126,7 +140,7 @@ void ExternalSorter::take(std::span<const PointRecord> records) {
       std::ranges::copy(some, to.begin() + static_cast<std::ptrdiff_t>(at));
     }
   });
-  for (const Digest& part : digests) digest_ = sum(digest_, part);
+  for (const RecordsDigest& part : digests) digest_ = sum(digest_, part);
   filled_ += records.size();
 }
 
@@ -180,9 +194,12 @@ void ExternalSorter::spill() {
 std::unique_ptr<PointStream> ExternalSorter::stream_memory() {
   const std::span<PointRecord> records = memory().first(filled_);
   radix_sort(records, scratch(), executor_);
-  arena_.discard(plan_.run_records * sizeof(PointRecord), plan_.run_records * sizeof(PointRecord));
+  if (!options_.restarts) {
+    const std::size_t bytes = plan_.run_records * sizeof(PointRecord);
+    arena_.discard(bytes, bytes);
+  }
   buckets_ = 1;
-  return std::make_unique<MemoryStream>(records, [this] { arena_ = Arena(); });
+  return std::make_unique<MemoryStream>(records, [this] { release_memory(); });
 }
 
 void ExternalSorter::spill_all() {
@@ -219,7 +236,7 @@ std::unique_ptr<PointStream> ExternalSorter::stream_buckets(std::uint64_t first)
     first -= partition_->size(range);
   auto stream = std::make_unique<BucketStream>(
       BucketLoader(partition_, range, kept_ ? *nested_ : *file_, plan_, executor_, buckets_),
-      memory(), executor_, [this] { arena_ = Arena(); });
+      memory(), executor_, [this] { release_memory(); });
   pass_over(*stream, first);
   return stream;
 }

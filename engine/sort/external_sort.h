@@ -15,6 +15,7 @@
 #include "engine/base/memory.h"
 #include "engine/base/stream.h"
 #include "engine/io/file/state_file.h"
+#include "engine/sort/records_digest.h"
 #include "engine/sort/sort_plan.h"
 #include "engine/sort/spill.h"
 #include "format/point_record.h"
@@ -34,6 +35,8 @@ struct SortOptions {
   /// Whether records may have emission; without it, the emission of a record that is spilled is
   /// lost.
   bool emits = false;
+  /// Keeps the memory when all records were handed out, for ExternalSorter::restart().
+  bool restarts = false;
   /// The names of the temporary files, which then are kept and hold all records, even those that
   /// would fit in memory. Empty: the files have no names.
   std::vector<std::filesystem::path> kept_files;
@@ -87,8 +90,8 @@ class ExternalSorter {
   /// @throws std::system_error naming the directory when records cannot be spilled, now or in the
   ///         background since an earlier call; the sorter is then of no further use
   void add(std::span<const PointRecord> records);
-  /// An order-independent digest of all records so far: the same set gives the same value.
-  [[nodiscard]] std::array<std::uint64_t, 2> digest() const noexcept { return digest_; }
+  /// The digest of all records so far.
+  [[nodiscard]] RecordsDigest digest() const noexcept { return digest_; }
   /// Spills all records to the kept files and writes what another process needs to resume from
   /// them. Nothing may be added afterwards.
   /// @throws as add()
@@ -98,10 +101,16 @@ class ExternalSorter {
   /// Threads: safe while others read the stream.
   void discard_before(std::uint64_t record);
   /// Returns the sorted stream, which this sorter must outlive. Nothing may be added afterwards.
-  /// The memory is released when the last record has been handed out.
+  /// The memory is released when the last record has been handed out, unless
+  /// SortOptions::restarts.
   /// @param first  the number of the first record in sorted order; above 0 only with kept files
   /// @throws as add(); so does the stream's next()
   [[nodiscard]] std::unique_ptr<PointStream> finish(std::uint64_t first = 0);
+  /// Begins anew without records. Memory that was used before need not be cleared by the system.
+  /// @param expected  as SortOptions::expected, and not more than that of the first time
+  /// @param sample    as for the constructor, of the records that will come
+  /// @pre SortOptions::restarts, no kept files; what finish() returned is gone
+  void restart(std::uint64_t expected, std::span<const MortonKey> sample);
   [[nodiscard]] SortStatistics statistics() const noexcept;
 
  private:
@@ -113,6 +122,8 @@ class ExternalSorter {
   [[nodiscard]] std::size_t part_records() noexcept { return memory().size() / 4; }
   [[nodiscard]] std::span<std::uint16_t> ranges_of(std::span<const PointRecord> records) noexcept;
 
+  void begin(std::span<const MortonKey> sample);
+  void release_memory() noexcept;
   void take(std::span<const PointRecord> records);
   void begin_partition();
   void spill();
@@ -130,7 +141,7 @@ class ExternalSorter {
   std::vector<std::uint16_t> range_of_;  ///< the range of each record of the first run
   bool kept_ = false;                    ///< the temporary files have names and stay
   std::uint64_t points_ = 0;
-  std::array<std::uint64_t, 2> digest_{};
+  RecordsDigest digest_{};
   bool finished_ = false;
   std::optional<SpillFile> file_;  ///< set from the first spill on, or with kept files
   std::shared_ptr<Partition> partition_;

@@ -319,11 +319,13 @@ class Farm(ProgramTest):
         # So do the tasks
         for change, said in ((lambda p: p["tasks"].pop(), "and a join"), (lambda p: p["tasks"].reverse(), "and a join"),
                              (lambda p: p["tasks"][1].update(number=7), "and a join"),
-                             (lambda p: p["cuts"].pop(), "and a join"), (lambda p: p["cuts"].reverse(), "do not ascend"),
+                             (lambda p: p["cuts"].pop(), "and a join"), (lambda p: p["cuts"].reverse(), "the cuts do not ascend"),
+                             (lambda p: p["borders"].reverse(), "the borders do not ascend"),
+                             (lambda p: p["borders"].remove(p["cuts"][0]), "a cut is no border"),
                              (lambda p: p["inputs"][0].update(taken=[True]), "number of channels"),
                              (lambda p: p["inputs"].clear(), "no inputs"),
                              (lambda p: p["inputs"][0].update(path="/a.ptcx"), "neither files nor the city"),
-                             (lambda p: p["inputs"][0].update(blocks=[0, 10**9]), "blocks that the city lacks"),
+                             (lambda p: p["inputs"][0].update(blocks=[5, 4]), "blocks of an input do not ascend"),
                              (lambda p: p["inputs"][0].update(channels=[CHANNEL]), "no component of 1, 2, 4 or 8 bytes"),
                              (lambda p: p["request"].update(leaf_points=0), "points in a leaf"),
                              (lambda p: p["request"].update(levels_per_stream=99), "levels in a stream"),
@@ -344,6 +346,12 @@ class Farm(ProgramTest):
             message = self.fail_with(1, "ptcfarm", "run", path)
             self.assertIn(str(path), message)
             self.assertIn(said, message)
+        # The city is laid out by routes alone
+        plan = json.loads(whole)
+        plan["inputs"][0].update(blocks=[0, 10**9])
+        path.write_text(json.dumps(plan))
+        message = self.fail_with(1, "ptcfarm", "route", path, "--number", "0")
+        self.assertIn("blocks that the city lacks", message)
 
     def test_an_input_that_got_other_channels_is_refused(self):
         cloud = self.here / "c.ply"
@@ -407,7 +415,7 @@ class Farm(ProgramTest):
         path = self.here / "farm.json"
         self.plan("--city", "30k")
         text = path.read_text()
-        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 3", "ptcfarm plan 2"),
+        for changed in ("", "{}", "[1]", text[:-100], text.replace("ptcfarm plan 4", "ptcfarm plan 3"),
                         text.replace('"kind": "join"', '"kind": "frob"'), text.replace('"points"', '"dots"')):
             path.write_text(changed)
             result = run("ptcfarm", "status", path)

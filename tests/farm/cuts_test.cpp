@@ -75,3 +75,34 @@ TEST_CASE("cuts: points of one position and samples of few points are not cut", 
   CHECK(choose_cuts(sample_of(scene.records, 1), 4, 16).empty());
   CHECK_FALSE(choose_cuts(sample_of(scene.records, 1), 2, 15).empty());
 }
+
+TEST_CASE("cuts: the ranges of parts are about equally large and begin where parts do",
+          "[farm][cuts]") {
+  const SortedScene scene = sort_scene(random_surfels(40'000, 6));
+  const std::vector<MortonKey> sample = sample_of(scene.records, 4);
+  const std::vector<MortonKey> cuts = choose_cuts(sample, 3, 16);
+  REQUIRE(cuts.size() == 2);
+  const std::vector<MortonKey> borders = choose_borders(sample, cuts, 5);
+  CHECK(borders.size() == 14);
+  CHECK(std::ranges::includes(borders, cuts));
+  std::size_t before = 0;
+  for (std::size_t i = 0; i <= borders.size(); ++i) {
+    const auto behind = i < borders.size() ? std::ranges::lower_bound(scene.records, borders[i], {},
+                                                                      &PointRecord::key)
+                                           : scene.records.end();
+    const auto end = static_cast<std::size_t>(behind - scene.records.begin());
+    CHECK(end - before > 40'000 / 15 * 8 / 10);
+    CHECK(end - before < 40'000 / 15 * 12 / 10);
+    before = end;
+  }
+}
+
+TEST_CASE("cuts: where the sample has few keys, parts have fewer ranges", "[farm][cuts]") {
+  const std::vector<MortonKey> keys = {{0, 1}, {0, 5}, {0, 5}, {0, 5}, {0, 9}};
+  using Keys = std::vector<MortonKey>;
+  CHECK(choose_borders(keys, {}, 1).empty());
+  CHECK(choose_borders(keys, {}, 100) == Keys{{0, 1}, {0, 5}, {0, 9}});
+  CHECK(choose_borders(keys, Keys{{0, 5}, {0, 7}, {0, 8}}, 2) ==
+        Keys{{0, 1}, {0, 5}, {0, 7}, {0, 8}, {0, 9}});
+  CHECK(choose_borders({}, Keys{{0, 5}}, 4) == Keys{{0, 5}});
+}

@@ -2,9 +2,11 @@
 #include "engine/pipeline/farm/range_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <string>
 
 #include <catch2/catch.hpp>
 
@@ -44,7 +46,7 @@ Points some_points(std::size_t count) {
 /// @param block  points of a block
 void write(const std::filesystem::path& path, const Points& points,
            const std::vector<MortonKey>& cuts, std::uint64_t block = 64) {
-  RangeWriter writer(path, kPlan, cuts, kRow, (cuts.size() + 3) * block * kRow.bytes());
+  RangeWriter writer(path, kPlan, cuts, kRow, (cuts.size() + 4) * block * kRow.bytes());
   for (std::size_t at = 0; at < points.records.size(); at += 100) {
     const std::size_t count = std::min<std::size_t>(100, points.records.size() - at);
     std::vector<std::vector<PointRecord>> values;
@@ -57,9 +59,14 @@ void write(const std::filesystem::path& path, const Points& points,
   writer.finish();
 }
 
-RangeReader open(const std::filesystem::path& path, std::uint32_t range) {
-  return {path, kRow, read_range(path, kPlan, kRow, range)};
-}
+/// The blocks of some ranges of a file, and their reader.
+struct Ranges {
+  std::vector<RangeBlock> blocks;
+  RangeReader reader;
+  Ranges(const std::filesystem::path& path, std::size_t first, std::size_t end)
+      : blocks(read_ranges(path, kPlan, kRow, first, end)), reader(path, kRow, blocks) {}
+  Ranges(const std::filesystem::path& path, std::size_t range) : Ranges(path, range, range + 1) {}
+};
 
 std::vector<MortonKey> cuts_of(const Points& points, std::size_t parts) {
   std::vector<MortonKey> keys, cuts;
@@ -84,7 +91,8 @@ TEST_CASE("range file: the points of each range come in the order of the input",
       if (std::ranges::upper_bound(cuts, points.records[i].key) - cuts.begin() == range)
         wanted.push_back(i);
     }
-    RangeReader reader = open(dir / "route", range);
+    Ranges ranges(dir / "route", range);
+    RangeReader& reader = ranges.reader;
     std::size_t at = 0;
     std::vector<PointRecord> values;
     while (reader.next()) {
@@ -131,8 +139,8 @@ TEST_CASE("range file: keys of a range are sampled evenly over its files", "[far
     at -= wanted.size();
   }
   std::vector<MortonKey> keys;
-  const std::uint64_t ahead = open(dir / "a", 1).sample_keys(0, every, keys);
-  CHECK(open(dir / "b", 1).sample_keys(ahead, every, keys) == at);
+  const std::uint64_t ahead = Ranges(dir / "a", 1).reader.sample_keys(0, every, keys);
+  CHECK(Ranges(dir / "b", 1).reader.sample_keys(ahead, every, keys) == at);
   CHECK(keys == expected);
 }
 
@@ -145,7 +153,8 @@ TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refus
   const auto read = [&] {
     std::size_t count = 0;
     for (std::uint32_t range = 0; range < 2; ++range) {
-      RangeReader reader = open(dir / "route", range);
+      Ranges ranges(dir / "route", range);
+      RangeReader& reader = ranges.reader;
       while (reader.next()) count += reader.block().size();
     }
     return count;
@@ -173,7 +182,7 @@ TEST_CASE("range file: a flipped byte of a point, a cut or another plan is refus
     CHECK_THROWS_AS(read(), DataError);
   }
   change(whole);
-  CHECK_THROWS_WITH(read_range(dir / "route", kPlan + 1, kRow, 0),
+  CHECK_THROWS_WITH(read_ranges(dir / "route", kPlan + 1, kRow, 0, 1),
                     Catch::Contains("of another plan"));
 }
 
@@ -184,7 +193,8 @@ TEST_CASE("range file: a point that no container can hold is refused by name",
     Points points = some_points(50);
     change(points.records[20]);
     write(dir / "route", points, {});
-    RangeReader reader = open(dir / "route", 0);
+    Ranges ranges(dir / "route", 0);
+    RangeReader& reader = ranges.reader;
     CHECK_THROWS_WITH(reader.next(), Catch::Contains((dir / "route").string()) &&
                                          Catch::Contains("point 20: radius, radiance"));
   };
@@ -214,20 +224,39 @@ TEST_CASE("range file: blocks behind the end, with checksums that fit, are refus
   const Points points = some_points(300);
   write(path, points, cuts_of(points, 3));
   const std::vector<char> whole = bytes_of(path);
-  // The place of the table ends the file; in a row of it, 4 bytes of range come before the offset
+  // The end has the plan, the places of rows and index, the ranges and the checksum of these; a row
+  // has offset, points, checksum and three digests; the index has first row and checksum of a range
   const auto bytes = std::as_bytes(std::span(whole));
-  const std::byte* const end = bytes.data() + bytes.size() - 24;
-  const auto table = load<std::uint64_t>(end, 0), length = load<std::uint64_t>(end, 8);
-  for (const std::size_t field : {table + 16 + 4, table + 16 + 12}) {  // offset, points
-    for (const std::uint64_t value : {table + 1, table, ~std::uint64_t{0}}) {
-      CAPTURE(field, value);
-      std::vector<std::byte> changed(bytes.begin(), bytes.end());
-      store(changed.data(), field, value);
-      store(changed.data(), changed.size() - 8, xxh3_64(std::span(changed).subspan(table, length)));
-      OutputFile file(path);
-      file.append(changed);
-      file.publish();
-      CHECK_THROWS_WITH(read_range(path, kPlan, kRow, 0), Catch::Contains("out of range"));
-    }
+  const std::size_t end = bytes.size() - 40;
+  const auto rows = load<std::uint64_t>(bytes.data(), end + 8),
+             index = load<std::uint64_t>(bytes.data(), end + 16),
+             count = load<std::uint64_t>(bytes.data(), index + 16);
+  const auto refused = [&](std::size_t field, std::uint64_t value, const std::string& why) {
+    CAPTURE(field, value);
+    std::vector<std::byte> changed(bytes.begin(), bytes.end());
+    store(changed.data(), field, value);
+    const std::array<std::uint64_t, 3> whose{kPlan, 0, 0};
+    store(changed.data(), index + 8,
+          xxh3_64(std::span(changed).subspan(rows, count * 72),
+                  xxh3_64(std::as_bytes(std::span(whose)))));
+    store(changed.data(), end + 32, xxh3_64(std::span(changed).subspan(end, 32)));
+    OutputFile file(path);
+    file.append(changed);
+    file.publish();
+    CHECK_THROWS_WITH(read_ranges(path, kPlan, kRow, 0, 1), Catch::Contains(why));
+  };
+  for (const std::uint64_t value : {rows + 1, rows, ~std::uint64_t{0}}) {
+    refused(rows, value, "out of range");      // offset of a block
+    refused(rows + 8, value, "out of range");  // its points
   }
+  refused(index, count + 1, "the index of the file is damaged");
+  refused(index, 1000, "out of range");
+  refused(index + 16, count - 1, "the table of the file is damaged");
+  for (const std::uint64_t value : {index + 1, ~std::uint64_t{0}}) {
+    refused(end + 8, value, "the end of the file is damaged");   // place of the rows
+    refused(end + 24, value, "the end of the file is damaged");  // number of ranges
+  }
+  refused(end + 16, 0, "the end of the file is damaged");  // place of the index
+  refused(end + 16, ~std::uint64_t{0}, "the end of the file is damaged");
+  refused(end + 24, 0, "the file has fewer ranges");
 }

@@ -20,18 +20,30 @@ using namespace ptc;
 
 namespace {
 
-/// Calls a function once, when a stage begins.
+enum class When { begun, advanced };
+
+/// Calls a function once, when a stage begins or when it has done its first points.
 class AtStage : public Progress {
  public:
-  AtStage(std::string stage, std::function<void()> then)
-      : stage_(std::move(stage)), then_(std::move(then)) {}
+  AtStage(std::string stage, std::function<void()> then, When when = When::begun)
+      : stage_(std::move(stage)), when_(when), then_(std::move(then)) {}
   void begin(const std::string& stage, std::uint64_t, const std::string&) override {
-    if (stage == stage_ && then_) std::exchange(then_, nullptr)();
+    reached_ = stage == stage_;
+    if (when_ == When::begun) call();
+  }
+  void advance(std::uint64_t) override {
+    if (when_ == When::advanced) call();
   }
   [[nodiscard]] bool called() const { return then_ == nullptr; }
 
  private:
+  void call() {
+    if (reached_ && then_) std::exchange(then_, nullptr)();
+  }
+
   std::string stage_;
+  When when_;
+  bool reached_ = false;
   std::function<void()> then_;
 };
 
@@ -70,7 +82,7 @@ struct City {
 TEST_CASE("task: a part that loses its routes to the join of others ends well", "[farm][tasks]") {
   const City city;
   city.run("route.0");
-  AtStage others("sort", [&] { city.run_all(); });
+  AtStage others("build", [&] { city.run_all(); });
   CHECK_FALSE(run_task(city.plan, city.task("part.0"), {}, others));
   CHECK(others.called());
   CHECK(TaskMarks(city.plan).state(city.task("part.0")) == TaskState::done);
@@ -80,11 +92,12 @@ TEST_CASE("task: a part that another process does first writes the same files", 
   const City city;
   city.run("route.0");
   std::vector<char> part, edges;
-  AtStage others("build", [&] {
+  const auto do_all = [&] {
     city.run_all();
     part = test::bytes_of(city.part(0));
     edges = test::bytes_of(edges_path(city.part(0)));
-  });
+  };
+  AtStage others("build", do_all, When::advanced);  // when its points are read
   CHECK(run_task(city.plan, city.task("part.0"), {}, others));
   CHECK((test::bytes_of(city.part(0)) == part));
   CHECK((test::bytes_of(edges_path(city.part(0))) == edges));
@@ -106,7 +119,7 @@ TEST_CASE("task: edges of an earlier part stay until those of the next replace t
   std::filesystem::remove(city.plan.folder() / "done" / "part.1");
   std::filesystem::remove(city.plan.folder() / "done" / "route.0");
   city.run("route.0");
-  AtStage others("sort", [&] { CHECK((test::bytes_of(edges_path(city.part(1))) == edges)); });
+  AtStage others("build", [&] { CHECK((test::bytes_of(edges_path(city.part(1))) == edges)); });
   CHECK(run_task(city.plan, city.task("part.1"), {}, others));
   CHECK(others.called());
 }
@@ -130,7 +143,8 @@ void write_sheet(const std::filesystem::path& path, int points, const std::strin
 
 }  // namespace
 
-TEST_CASE("task: routes of shares of containers give the parts of whole routes", "[farm][tasks]") {
+TEST_CASE("task: shares of containers and ranges of parts do not change the parts",
+          "[farm][tasks]") {
   // One has two channels, the other one of them; the plan records the order of both
   const test::TemporaryDirectory directory;
   Progress silent;
@@ -146,24 +160,26 @@ TEST_CASE("task: routes of shares of containers give the parts of whole routes",
                     request.inputs.back(), silent);
   }
   std::vector<std::vector<char>> parts;
-  std::vector<std::size_t> routes;
-  for (const std::uint64_t share : {std::uint64_t{100'000}, std::uint64_t{2'000}}) {
-    FarmOptions options{.parts = 2, .share_points = share};
+  const auto build = [&](std::uint64_t share, std::size_t ranges, std::size_t routes) {
+    FarmOptions options{.parts = 2, .share_points = share, .ranges = ranges};
     options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
     const auto name = [&](const char* end) {
-      return directory / ("of" + std::to_string(share) + end);
+      return directory / ("of" + std::to_string(share) + "in" + std::to_string(ranges) + end);
     };
     FarmPlan plan = make_plan(request, name(".ptcx"), name(".json"), options, silent);
     write_plan(plan);
     plan = read_plan(plan.file, options.command);
     for (const FarmTask& task : plan.tasks) run_task(plan, task, {}, silent);
-    routes.push_back(plan.inputs.size());
+    CHECK(plan.inputs.size() == routes);
+    CHECK(plan.borders.size() == 2 * ranges - 1);
     for (std::size_t i = 0; i < 2; ++i)
       parts.push_back(test::bytes_of(plan.output({TaskKind::part}, i)));
-  }
-  CHECK(routes == std::vector<std::size_t>{2, 7});
-  CHECK((parts[0] == parts[2]));
-  CHECK((parts[1] == parts[3]));
+  };
+  build(100'000, 1, 2);
+  build(2'000, 1, 7);
+  build(2'000, 5, 7);
+  build(100'000, 60, 2);
+  for (std::size_t i = 2; i < parts.size(); ++i) CHECK((parts[i] == parts[i % 2]));
 }
 
 TEST_CASE("ranges: rays of a range are those of a whole run", "[farm][ranges]") {

@@ -229,6 +229,38 @@ TEST_CASE("external sort: each block is filled as long as there are records", "[
   CHECK(stream->next(out) == 5000);
 }
 
+TEST_CASE("external sort: one that begins anew sorts only what came since", "[sort]") {
+  const std::vector<PointRecord> records = make_records(Keys::surface, 9000);
+  const auto cap =
+      GENERATE(as<std::uint64_t>{}, kMinCap, 64 * kMiB);  // spills the larger ones, or none
+  const auto threads = GENERATE(1U, 2U);
+  const TemporaryDirectory directory;
+  const ThreadPool executor(threads);
+  SortOptions options{cap, {directory.path()}, 4'000};
+  options.restarts = true;
+  ExternalSorter sorter(options, executor, {});
+  std::size_t begin = 0;
+  for (const std::size_t count : {3'900U, 1'000U, 0U, 4'000U, 100U}) {
+    CAPTURE(cap, threads, count);
+    const auto own = std::span(records).subspan(begin, count);
+    begin += count;
+    sorter.restart(count, {});
+    add_in_blocks(sorter, own, 777);
+    const Outcome wanted = sort(own, 64 * kMiB, 1, {});
+    CHECK(sorter.digest() == wanted.digest);
+    CHECK(same_bytes(drain(*sorter.finish(), 500), wanted.records));
+    CHECK((sorter.statistics().spilled_bytes > 0) == (cap == kMinCap && count > 1'536));
+  }
+  CHECK(begin == records.size());
+}
+
+TEST_CASE("external sort: only a sort that keeps its memory can begin anew", "[sort]") {
+  const TemporaryDirectory directory;
+  const ThreadPool executor(1);
+  ExternalSorter sorter({kMinCap, {directory.path()}}, executor, {});
+  CHECK_THROWS_AS(sorter.restart(1, {}), std::invalid_argument);
+}
+
 TEST_CASE("external sort: the digest depends on the set of records, not on their order",
           "[sort][digest]") {
   const TemporaryDirectory directory;

@@ -272,13 +272,10 @@ std::uint64_t AttributeSorts::expected_spill() const noexcept {
   return bytes;
 }
 
-std::vector<std::uint64_t> AttributeSorts::digest() const {
-  std::vector<std::uint64_t> digest;
-  for (const auto& sort : sorts_) {
-    const auto own = sort->digest();
-    digest.insert(digest.end(), own.begin(), own.end());
-  }
-  return digest;
+std::vector<RecordsDigest> AttributeSorts::digest() const {
+  std::vector<RecordsDigest> digests;
+  for (const auto& sort : sorts_) digests.push_back(sort->digest());
+  return digests;
 }
 
 void AttributeSorts::keep(StateWriter& state) {

@@ -155,8 +155,8 @@ class AttributeSorts {
   [[nodiscard]] std::size_t size() const noexcept { return sorts_.size(); }
   /// Bytes of temporary files that the expected points take.
   [[nodiscard]] std::uint64_t expected_spill() const noexcept;
-  /// An order-independent digest of all values so far; empty when there are no groups.
-  [[nodiscard]] std::vector<std::uint64_t> digest() const;
+  /// The digests of all values so far, one for each group.
+  [[nodiscard]] std::vector<RecordsDigest> digest() const;
   /// Spills everything to the kept files and writes what another process needs to resume.
   void keep(StateWriter& state);
   /// Returns the sorted values of a group, a stream of records whose keys are those of the points.

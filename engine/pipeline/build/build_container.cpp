@@ -426,8 +426,9 @@ class Build {
     points.still_light = std::move(inputs.still_light);
     points.plan.meta = record(meta, spacing);
     check_meta(points.plan.meta, request_.page_shift, points.plan.point_bytes());
-    points.plan.uuid = content_uuid(*points.sorter, *points.attributes, frame, request_,
-                                    points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
+    points.plan.uuid =
+        content_uuid(points.sorter->digest(), points.attributes->digest(), frame, request_,
+                     points.plan.meta, scene_ ? scene_->header().uuid : Uuid{});
     if (resumption_) resumption_->keep(points.plan, *points.sorter, *points.attributes);
     return points;
   }

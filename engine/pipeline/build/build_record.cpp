@@ -50,13 +50,13 @@ Meta complete_record(Meta meta, double spacing, const Meta* scene, std::uint8_t 
   return meta;
 }
 
-Uuid content_uuid(const ExternalSorter& sorter, const AttributeSorts& attributes,
+Uuid content_uuid(const RecordsDigest& points, std::span<const RecordsDigest> attributes,
                   const Frame& frame, const BuildRequest& request, const Meta& meta,
                   const Uuid& scene) {
-  std::string text = fmt::format(
-      "{:x} {:x} {} {} {} {} {} {} {} {}", sorter.digest()[0], sorter.digest()[1], frame.origin[0],
-      frame.origin[1], frame.origin[2], frame.edge, request.tree.leaf_points,
-      request.tree.levels_per_stream, request.page_shift, static_cast<int>(request.profile));
+  std::string text = fmt::format("{:x} {:x} {} {} {} {} {} {} {} {}", points[0], points[1],
+                                 frame.origin[0], frame.origin[1], frame.origin[2], frame.edge,
+                                 request.tree.leaf_points, request.tree.levels_per_stream,
+                                 request.page_shift, static_cast<int>(request.profile));
   for (const auto& [key, value] : meta.text)
     text.append("\n").append(key).append("=").append(value);
   for (const Channel& c : meta.channels) {
@@ -65,7 +65,8 @@ Uuid content_uuid(const ExternalSorter& sorter, const AttributeSorts& attributes
                         static_cast<int>(c.colour_space), c.unit, c.no_value.value_or(0), c.scale,
                         c.offset);
   }
-  for (const std::uint64_t part : attributes.digest()) text += fmt::format(" {:x}", part);
+  for (const RecordsDigest& group : attributes)
+    text += fmt::format(" {:x} {:x}", group[0], group[1]);
   if (scene != Uuid{})
     text.append("\n").append(reinterpret_cast<const char*>(scene.data()), scene.size());
   return uuid_of(std::as_bytes(std::span(text)));

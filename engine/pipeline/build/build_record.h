@@ -2,11 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
 #include "engine/pipeline/build/build_inputs.h"
-#include "engine/sort/external_sort.h"
+#include "engine/sort/records_digest.h"
 #include "format/schema.h"
 
 namespace ptc {
@@ -25,9 +26,12 @@ namespace ptc {
 
 /// Returns the UUID of a container. Equal points, settings and record give an equal file, so they
 /// are all that the UUID is made of.
-/// @param scene  UUID of the container that the points are appended to; zeros when there is none
-[[nodiscard]] Uuid content_uuid(const ExternalSorter& sorter, const AttributeSorts& attributes,
-                                const Frame& frame, const BuildRequest& request, const Meta& meta,
-                                const Uuid& scene);
+/// @param points      digest of the points, in any order
+/// @param attributes  digests of their values, group after group
+/// @param scene       UUID of the container that the points are appended to; zeros when there is
+///                    none
+[[nodiscard]] Uuid content_uuid(const RecordsDigest& points,
+                                std::span<const RecordsDigest> attributes, const Frame& frame,
+                                const BuildRequest& request, const Meta& meta, const Uuid& scene);
 
 }  // namespace ptc

@@ -1,4 +1,4 @@
-// The points of the inputs are sent to ranges of the curve, and each range is sorted and built.
+// The points of the inputs are sent to ranges of the curve, and each part is sorted and built.
 #include "engine/pipeline/farm/build_tasks.h"
 
 #include <algorithm>
@@ -21,6 +21,7 @@
 #include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/resume.h"
+#include "engine/pipeline/farm/range_sorts.h"
 #include "engine/pipeline/parts/part_edges.h"
 #include "engine/scene/procedural/city.h"
 #include "engine/store/writer.h"
@@ -38,7 +39,7 @@ constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
 std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t cap, const char* field) {
   MemoryBudget budget(cap, "a route of this plan", field);
   budget.charge("buffers", kBufferBytes);
-  return budget.rest("the ranges", RangeWriter::least_memory(plan.parts(), plan.row()));
+  return budget.rest("the ranges", RangeWriter::least_memory(plan.borders.size() + 1, plan.row()));
 }
 
 /// Returns the bytes that a part has for its sorts.
@@ -62,13 +63,15 @@ class Route {
         progress_(progress),
         attributes_(plan.attributes()),
         values_(attributes_.groups()),
-        writer_(task.outputs.at(0), plan.id, plan.cuts, plan.row(),
+        writer_(task.outputs.at(0), plan.id, plan.borders, plan.row(),
                 ranges_bytes(plan, run.memory_bytes, kCapOfRun)) {}
 
   void run() {
     const FarmInput& input = plan_.inputs[number_];
     progress_.begin("route", input.points, "points");
     if (input.path.empty()) {
+      if (input.blocks.end > city_blocks(plan_.request.city_points))
+        throw DataError(plan_.file.string() + ": an input has blocks that the city lacks");
       feed(*make_city(plan_.request.city_points, input.blocks), AttributePlan::kNoInput, kAll);
     } else {
       const std::vector<InputState>& states = plan_.files.at(input.path);
@@ -161,7 +164,7 @@ class WithinPart : public PointStream {
   std::string name_;
 };
 
-/// Sorts and builds a range of all inputs.
+/// Sorts and builds a part of all inputs.
 class Part {
  public:
   Part(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress)
@@ -175,7 +178,9 @@ class Part {
                               })),
         executor_(fit_.threads),
         progress_(progress),
-        attributes_(plan.attributes()) {}
+        attributes_(plan.attributes()),
+        row_(plan.row()),
+        digests_(attributes_.groups() + 1) {}
 
   /// Builds the part. @return  whether it has points; one without has no file
   [[nodiscard]] bool run() {
@@ -184,8 +189,18 @@ class Part {
       remove_part(target_);
       return false;
     }
-    progress_.begin("sort", points, "points");
-    sort(points);
+    // Two sorts of the points of a range share as much memory as each sort of values has
+    sort_ = {.memory_bytes = fit_.bytes / (attributes_.groups() + 1),
+             .temp_dirs = temp_dirs(run_, target_),
+             .expected = points,
+             .emits = plan_.emits};
+    std::vector<MortonKey> keys;
+    if (attributes_.groups() > 0) keys = sample(first_, end_, points, sort_.memory_bytes);
+    sorts_.emplace(attributes_, sort_, std::span<const std::filesystem::path>(), executor_, keys);
+    sort_.expected = 0;
+    for (std::size_t range = first_; range < end_; ++range)
+      sort_.expected = std::max(sort_.expected, points_of(range));
+    if (end_ - first_ > 1) sort_.memory_bytes /= 2;
     progress_.begin("build", points, "points");
     build();
     progress_.end();
@@ -196,7 +211,13 @@ class Part {
   /// The points of the part that a task has routed.
   struct Routed {
     std::filesystem::path path;
-    std::vector<RangeBlock> blocks;
+    std::vector<RangeBlock> blocks;  ///< by range
+
+    /// Returns those of some ranges.
+    [[nodiscard]] std::span<const RangeBlock> of(std::size_t first, std::size_t end) const {
+      return {std::ranges::lower_bound(blocks, first, {}, &RangeBlock::range),
+              std::ranges::lower_bound(blocks, end, {}, &RangeBlock::range)};
+    }
   };
 
   /// Finds the points of the part in the files of the routes.
@@ -205,60 +226,72 @@ class Part {
     std::uint64_t points = 0;
     for (std::size_t i = 0; i < plan_.inputs.size(); ++i) {
       Routed route{.path = plan_.output({TaskKind::route}, i), .blocks = {}};
-      route.blocks = read_range(route.path, plan_.id, plan_.row(), range());
-      for (const RangeBlock& block : route.blocks) points += block.points;
+      route.blocks = read_ranges(route.path, plan_.id, row_, first_, end_);
+      for (const RangeBlock& block : route.blocks) {
+        points += block.points;
+        for (std::size_t set = 0; set < digests_.size(); ++set)
+          digests_[set] = sum(digests_[set], block.digests[set]);
+      }
       if (!route.blocks.empty()) routes_.push_back(std::move(route));
     }
     return points;
   }
 
-  [[nodiscard]] RangeReader open(const Routed& route) const {
-    return {route.path, plan_.row(), route.blocks};
+  /// Returns the number of points of a range.
+  [[nodiscard]] std::uint64_t points_of(std::size_t range) const {
+    std::uint64_t points = 0;
+    for (const Routed& route : routes_) {
+      for (const RangeBlock& block : route.of(range, range + 1)) points += block.points;
+    }
+    return points;
   }
 
-  [[nodiscard]] std::uint32_t range() const { return static_cast<std::uint32_t>(number_); }
-
-  /// Gives the memory to the sorts: those of values get equal shares.
-  void sort(std::uint64_t points) {
-    const std::size_t groups = attributes_.groups();
-    const SortOptions options{.memory_bytes = fit_.bytes / (groups + 1),
-                              .temp_dirs = temp_dirs(run_, target_),
-                              .expected = points,
-                              .emits = plan_.emits};
-    const std::vector<MortonKey> sample = keys_of_range(points);
-    sorter_ = std::make_unique<ExternalSorter>(options, executor_, sample);
-    sorts_.emplace(attributes_, options, std::span<const std::filesystem::path>(), executor_,
-                   sample);
+  /// Adds the points of the next range that has some to a sort, and their values to theirs.
+  /// @return  whether there was one
+  [[nodiscard]] bool read_range(ExternalSorter& sorter) {
+    std::uint64_t points = 0;
+    while (first_ < end_ && (points = points_of(first_)) == 0) ++first_;
+    if (first_ == end_) return false;
+    sorter.restart(points, sample(first_, first_ + 1, points, sort_.memory_bytes));
     std::vector<PointRecord> values;
     for (const Routed& route : routes_) {
-      RangeReader reader = open(route);
+      const auto blocks = route.of(first_, first_ + 1);
+      if (blocks.empty()) continue;
+      RangeReader reader(route.path, row_, blocks);
       while (reader.next()) {
-        sorter_->add(reader.block());
-        for (std::size_t group = 0; group < groups; ++group) {
+        sorter.add(reader.block());
+        for (std::size_t group = 0; group < sorts_->size(); ++group) {
           reader.values(group, values);
           sorts_->add(group, values);
         }
-        progress_.advance(reader.block().size());
       }
     }
+    ++first_;
+    return true;
   }
 
-  /// Returns keys of points that are spread over the range, for the splitters of the sort.
-  [[nodiscard]] std::vector<MortonKey> keys_of_range(std::uint64_t points) const {
+  /// Returns keys of points that are spread over some ranges, for the splitters of a sort.
+  /// @param memory_bytes  of the sort; none where they all fit
+  [[nodiscard]] std::vector<MortonKey> sample(std::size_t first, std::size_t end,
+                                              std::uint64_t points,
+                                              std::uint64_t memory_bytes) const {
     constexpr std::uint64_t kPieces = 2048;
-    if (points * 2 * sizeof(PointRecord) <= run_.memory_bytes / 4) return {};  // all fit in memory
+    if (points * 3 * sizeof(PointRecord) <= memory_bytes) return {};
     std::vector<MortonKey> keys;
-    std::uint64_t first = 0;
-    for (const Routed& route : routes_)
-      first = open(route).sample_keys(first, points / kPieces + 1, keys);
+    std::uint64_t ahead = 0;
+    for (const Routed& route : routes_) {
+      RangeReader reader(route.path, row_, route.of(first, end));
+      ahead = reader.sample_keys(ahead, points / kPieces + 1, keys);
+    }
     return keys;
   }
 
   void build() {
     // Chain the streams
     const MortonKey first = number_ > 0 ? plan_.cuts[number_ - 1] : MortonKey{};
-    const auto sorted = sorter_->finish();
-    PointStream* points = sorted.get();
+    const auto read = [this](ExternalSorter& sorter) { return read_range(sorter); };
+    RangeSorts sorted(sort_, read, executor_);
+    PointStream* points = &sorted;
     std::unique_ptr<PointStream> unique, rounded;
     if (plan_.request.remove_duplicates) {
       unique = unique_points(*points);
@@ -272,12 +305,13 @@ class Part {
 
     // Write the pages, the values, and the edges of the tree
     BuildPlan made{.frame = plan_.frame, .meta = plan_.meta, .emits = plan_.emits};
-    ContainerWriter writer(target_, {.page_shift = plan_.request.page_shift,
-                                     .codec = codec_of(plan_.request.profile),
-                                     .uuid = content_uuid(*sorter_, *sorts_, plan_.frame,
-                                                          plan_.request, plan_.meta, {}),
-                                     .frame = plan_.frame,
-                                     .point_bytes = made.point_bytes()});
+    ContainerWriter writer(
+        target_, {.page_shift = plan_.request.page_shift,
+                  .codec = codec_of(plan_.request.profile),
+                  .uuid = content_uuid(digests_[0], std::span(digests_).subspan(1), plan_.frame,
+                                       plan_.request, plan_.meta, {}),
+                  .frame = plan_.frame,
+                  .point_bytes = made.point_bytes()});
     TreeEdges edges;
     const Superblock superblock =
         build_pages(within, writer, plan_.request.tree, executor_, progress_, {}, &edges);
@@ -305,8 +339,12 @@ class Part {
   const ThreadPool executor_;
   Progress& progress_;
   AttributePlan attributes_;
-  std::vector<Routed> routes_;  // those that have points of the part
-  std::unique_ptr<ExternalSorter> sorter_;
+  RangeRow row_;
+  std::size_t first_ = plan_.ranges_of(number_)[0];  ///< range that is read next
+  const std::size_t end_ = plan_.ranges_of(number_)[1];
+  std::vector<Routed> routes_;          ///< those that have points of the part
+  std::vector<RecordsDigest> digests_;  ///< of the points, and of the values of each group
+  SortOptions sort_;                    ///< of the points of a range
   std::optional<AttributeSorts> sorts_;
 };
 

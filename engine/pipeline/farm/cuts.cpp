@@ -59,4 +59,23 @@ std::vector<MortonKey> choose_cuts(std::span<const MortonKey> keys, std::size_t 
   return cuts;
 }
 
+std::vector<MortonKey> choose_borders(std::span<const MortonKey> sample,
+                                      std::span<const MortonKey> cuts, std::size_t per_part) {
+  std::vector<MortonKey> borders;
+  const auto add = [&](const MortonKey& border) {
+    if (borders.empty() || borders.back() < border) borders.push_back(border);
+  };
+  auto begin = sample.begin();
+  for (std::size_t part = 0; part <= cuts.size(); ++part) {
+    const bool is_last = part == cuts.size();
+    const auto end =
+        is_last ? sample.end() : std::ranges::lower_bound(begin, sample.end(), cuts[part]);
+    const std::span<const MortonKey> own(begin, end);
+    for (std::size_t i = 1; i < per_part && !own.empty(); ++i) add(own[own.size() * i / per_part]);
+    if (!is_last) add(cuts[part]);
+    begin = end;
+  }
+  return borders;
+}
+
 }  // namespace ptc

@@ -21,4 +21,14 @@ namespace ptc {
 [[nodiscard]] std::vector<MortonKey> choose_cuts(std::span<const MortonKey> sample,
                                                  std::size_t parts, std::uint32_t leaf_points);
 
+/// Divides parts into ranges, so that a part is sorted range by range.
+/// @param sample    keys of points, ascending
+/// @param cuts      where parts begin, but for the first; ascending
+/// @param per_part  ranges of a part, 1 or more
+/// @return  ascending keys at which ranges begin, but for the first; all cuts are among them. Where
+///          the sample has few keys, a part has fewer ranges
+[[nodiscard]] std::vector<MortonKey> choose_borders(std::span<const MortonKey> sample,
+                                                    std::span<const MortonKey> cuts,
+                                                    std::size_t per_part);
+
 }  // namespace ptc

@@ -31,9 +31,9 @@ namespace {
 
 // The share of a task's memory that the points of a part may take, so that its sort spills nothing.
 constexpr std::uint64_t kSortShare = 2;
-constexpr std::uint64_t kRangePoints = 1'000'000;  // that a task shades
-constexpr double kMaxSeconds = 1e9;                // of a task
-constexpr std::uint64_t kMaxShares = 10'000;       // of a file
+constexpr std::uint64_t kShadedPoints = 1'000'000;  // of a task
+constexpr double kMaxSeconds = 1e9;                 // of a task
+constexpr std::uint64_t kMaxShares = 10'000;        // of a file
 
 /// @param lit  the points are lit anew
 void check_inputs(const BuildInputs& inputs, bool lit) {
@@ -62,6 +62,20 @@ std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
   const std::uint64_t groups = plan.row().group_bytes.size();
   const std::uint64_t bytes = plan.points * (groups + 1) * 2 * sizeof(PointRecord);
   return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
+}
+
+/// Returns into how many ranges a part is divided at most: each is worth a sort of its own, and the
+/// blocks of each fill up in a route.
+std::size_t ranges_for(const FarmPlan& plan, const FarmOptions& options) {
+  if (options.ranges > 0) return options.ranges;
+  constexpr std::uint64_t kRangePoints = 5 << 16, kBlockPoints = 1 << 13, kMost = 64;
+  const std::uint64_t parts = plan.parts();
+  const std::uint64_t by_sort = plan.points / parts / kRangePoints;
+  const std::uint64_t by_route = plan.points / plan.inputs.size() / parts / kBlockPoints;
+  const std::uint64_t by_memory =
+      options.memory_bytes / 2 / parts / (kBlockPoints * plan.row().bytes());
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(std::min({by_sort, by_route, by_memory}), 1, kMost));
 }
 
 void require(const FarmPlan& plan, bool holds, const char* rule) {
@@ -157,17 +171,18 @@ void check_plan(const FarmPlan& plan) {
   require(plan, std::isfinite(plan.frame.edge) && plan.frame.edge > 0, "the frame has no edge");
   require(plan, !plan.inputs.empty(), "it has no inputs");
   const bool city = request.city_points > 0;
-  const std::uint64_t blocks = city ? city_blocks(request.city_points) : 0;
   for (const FarmInput& input : plan.inputs) {
     require(plan, input.path.empty() == city, "its inputs are neither files nor the city");
-    require(plan, input.blocks.first <= input.blocks.end && input.blocks.end <= blocks,
-            "an input has blocks that the city lacks");
+    require(plan, input.blocks.first <= input.blocks.end, "the blocks of an input do not ascend");
     check_channels(plan, input);
   }
   check_files(plan);
-  require(plan,
-          std::ranges::adjacent_find(plan.cuts, std::ranges::greater_equal()) == plan.cuts.end(),
-          "the cuts do not ascend");
+  const auto ascends = [](const std::vector<MortonKey>& keys) {
+    return std::ranges::adjacent_find(keys, std::ranges::greater_equal()) == keys.end();
+  };
+  require(plan, ascends(plan.cuts), "the cuts do not ascend");
+  require(plan, ascends(plan.borders), "the borders do not ascend");
+  require(plan, std::ranges::includes(plan.borders, plan.cuts), "a cut is no border");
   if (plan.lighting) check_lighting(*plan.lighting);
   if (plan.frames) check_frames(plan);
   if (!plan.shading) return;
@@ -182,8 +197,8 @@ void check_plan(const FarmPlan& plan) {
 /// been changed.
 void complete_tasks(FarmPlan& plan, const TaskCommand& command) {
   constexpr char kTasks[] =
-      "the tasks are not a route for each input, a part for each range, and a join, nor those that "
-      "light and shade";
+      "the tasks are not a route for each input, a part between all cuts, and a join, nor those "
+      "that light and shade";
   const std::vector<FarmTask> said = std::exchange(plan.tasks, {});
   require(plan, said.size() == count_tasks(plan), kTasks);
   add_tasks(plan, 0);
@@ -252,6 +267,16 @@ AttributePlan FarmPlan::attributes() const {
   if (plan.channels() != wanted)
     throw DataError(file.string() + ": the channels are not those of the inputs");
   return plan;
+}
+
+std::array<std::size_t, 2> FarmPlan::ranges_of(std::size_t part) const {
+  const auto first_of = [&](std::size_t number) {
+    if (number == 0) return std::size_t{0};
+    if (number == parts()) return borders.size() + 1;
+    const auto at = std::ranges::lower_bound(borders, cuts[number - 1]);
+    return static_cast<std::size_t>(at - borders.begin()) + 1;
+  };
+  return {first_of(part), first_of(part + 1)};
 }
 
 RangeRow FarmPlan::row() const {
@@ -328,9 +353,10 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   const std::vector<MortonKey> keys =
       sorted_keys(city ? sample_city(request.city_points) : inputs.sample, plan.frame);
   plan.cuts = choose_cuts(keys, parts_for(plan, options), request.tree.leaf_points);
+  plan.borders = choose_borders(keys, plan.cuts, ranges_for(plan, options));
   if (plan.shading && plan.shading->ranges == 0) {
     plan.shading->ranges = static_cast<std::size_t>(
-        std::clamp<std::uint64_t>(plan.shaded_points() / kRangePoints, 1, kMaxRanges));
+        std::clamp<std::uint64_t>(plan.shaded_points() / kShadedPoints, 1, kMaxRanges));
   }
   require_request(count_tasks(plan) <= kMaxTasks, "bounces",
                   "the plan has more than 1,000,000 tasks: take fewer parts, bounces or frames");

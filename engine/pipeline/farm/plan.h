@@ -147,7 +147,8 @@ struct FarmOptions {
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
   std::uint64_t share_points = 4'000'000;  ///< that a task routes, of a container or the city
-  std::optional<LightRequest> lighting;    ///< as of FarmPlan
+  std::size_t ranges = 0;  ///< of the curve in a part, at most; 0: as many as speed up its sort
+  std::optional<LightRequest> lighting;  ///< as of FarmPlan
   std::optional<FarmShading> shading;
   std::optional<FarmFrames> frames;
 };
@@ -163,9 +164,12 @@ struct FarmPlan {
   std::map<std::filesystem::path, std::vector<InputState>> files;
   Frame frame;
   bool emits = false;
-  std::uint64_t points = 0;  ///< expected
-  Meta meta;                 ///< record of each part, complete
-  std::vector<MortonKey> cuts;
+  std::uint64_t points = 0;     ///< expected
+  Meta meta;                    ///< record of each part, complete
+  std::vector<MortonKey> cuts;  ///< where parts begin, but for the first
+  /// Where ranges begin, but for the first: all cuts are among them. A route sorts points into
+  /// ranges, and a part sorts one range after another.
+  std::vector<MortonKey> borders;
   /// How the points of the scene are lit anew, when they are: lights are given, the scene is that
   /// of the plan. A plan that was read has no picture of the sky, but its path.
   std::optional<LightRequest> lighting;
@@ -175,6 +179,8 @@ struct FarmPlan {
 
   /// Returns the number of parts.
   [[nodiscard]] std::size_t parts() const noexcept { return cuts.size() + 1; }
+  /// Returns the numbers of the first range of a part, and of the one behind its last.
+  [[nodiscard]] std::array<std::size_t, 2> ranges_of(std::size_t part) const;
   /// Returns the folder of the parts, "scene.parts".
   [[nodiscard]] std::filesystem::path folder() const;
   /// Says whether an input is a share of a file that others have shares of.

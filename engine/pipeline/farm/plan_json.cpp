@@ -14,7 +14,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr char kFormat[] = "ptcfarm plan 3";
+constexpr char kFormat[] = "ptcfarm plan 4";
 
 OrderedJson to_json(const std::filesystem::path& path) {
   return path.string();
@@ -248,12 +248,17 @@ FarmTask task_of(const OrderedJson& json) {
 }
 
 /// Keys are numbers of 126 bits: two halves, the high one first.
-OrderedJson to_json(const MortonKey& key) {
-  return {key.high, key.low};
+OrderedJson to_json(const std::vector<MortonKey>& keys) {
+  OrderedJson list = OrderedJson::array();
+  for (const MortonKey& key : keys) list.push_back({key.high, key.low});
+  return list;
 }
 
-MortonKey key_of(const OrderedJson& json) {
-  return {json.at(0).get<std::uint64_t>(), json.at(1).get<std::uint64_t>()};
+std::vector<MortonKey> keys_of(const OrderedJson& json) {
+  std::vector<MortonKey> keys;
+  for (const OrderedJson& key : json)
+    keys.push_back({key.at(0).get<std::uint64_t>(), key.at(1).get<std::uint64_t>()});
+  return keys;
 }
 
 FarmPlan plan_of(const OrderedJson& json) {
@@ -278,7 +283,8 @@ FarmPlan plan_of(const OrderedJson& json) {
     plan.files[file.at("path").get<std::string>()] = states_of(file.at("states"));
   plan.meta = {channels_of(json.at("channels")),
                json.at("texts").get<std::map<std::string, std::string>>()};
-  for (const OrderedJson& cut : json.at("cuts")) plan.cuts.push_back(key_of(cut));
+  plan.cuts = keys_of(json.at("cuts"));
+  plan.borders = keys_of(json.at("borders"));
   if (json.contains("lighting")) plan.lighting = lighting_of(json.at("lighting"));
   if (json.contains("frames")) plan.frames = frames_of(json.at("frames"));
   if (json.contains("shading")) plan.shading = shading_of(json.at("shading"));
@@ -290,7 +296,7 @@ FarmPlan plan_of(const OrderedJson& json) {
 
 std::string plan_to_json(const FarmPlan& plan) {
   OrderedJson inputs = OrderedJson::array(), files = OrderedJson::array(),
-              cuts = OrderedJson::array(), tasks = OrderedJson::array();
+              tasks = OrderedJson::array();
   for (const FarmInput& input : plan.inputs) {
     inputs.push_back({{"path", input.path.string()},
                       {"blocks", {input.blocks.first, input.blocks.end}},
@@ -301,7 +307,6 @@ std::string plan_to_json(const FarmPlan& plan) {
   }
   for (const auto& [path, states] : plan.files)
     files.push_back({{"path", path.string()}, {"states", to_json(states)}});
-  for (const MortonKey& cut : plan.cuts) cuts.push_back(to_json(cut));
   for (const FarmTask& task : plan.tasks) tasks.push_back(to_json(task));
   OrderedJson json{{"format", kFormat},
                    {"scene", to_json(plan.scene)},
@@ -313,7 +318,8 @@ std::string plan_to_json(const FarmPlan& plan) {
                    {"files", files},
                    {"channels", to_json(plan.meta.channels)},
                    {"texts", plan.meta.text},
-                   {"cuts", cuts},
+                   {"cuts", to_json(plan.cuts)},
+                   {"borders", to_json(plan.borders)},
                    {"tasks", tasks}};
   if (plan.lighting) json["lighting"] = to_json(*plan.lighting);
   if (plan.frames) json["frames"] = to_json(*plan.frames);

@@ -287,7 +287,7 @@ void add_tasks(FarmPlan& plan, std::uint64_t memory_bytes) {
     task.seconds = static_cast<double>(input.points) * kRouteSeconds;
   }
 
-  // Build each range of all of them, join the parts, and light and shade what they are
+  // Build each part of all of them, join the parts, and light and shade what they are
   add_parts(plan, {TaskKind::part}, {TaskKind::join}, {TaskKind::route},
             {plan.folder() / "route.*"}, memory_bytes, kPartSeconds);
   const TaskStep lit = add_light(plan, memory_bytes);

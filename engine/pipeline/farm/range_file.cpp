@@ -20,8 +20,33 @@ namespace ptc {
 namespace {
 
 constexpr std::size_t kMinBlock = 64, kMaxBlock = std::size_t{1} << 14;  // points
-constexpr std::size_t kEndBytes =
-    3 * sizeof(std::uint64_t);  // place, length, checksum of the table
+// Two blocks are on their way to the file, and the values of one are unpacked.
+constexpr std::size_t kMoreBlocks = 3;
+// The plan, the place of the rows and of the index, the number of ranges, the checksum of these.
+constexpr std::size_t kEndBytes = 5 * sizeof(std::uint64_t);
+constexpr std::size_t kIndexBytes = 2 * sizeof(std::uint64_t);  // of a range: first row, checksum
+
+/// Takes the values of points apart from the bytes of a group: records with the points' keys.
+void unpack_values(std::span<const PointRecord> points, const std::byte* from, std::size_t bytes,
+                   std::vector<PointRecord>& records) {
+  records.assign(points.size(), {});
+  for (std::size_t i = 0; i < points.size(); ++i, from += bytes) {
+    records[i].key = points[i].key;
+    std::memcpy(values_of(records[i]), from, bytes);
+  }
+}
+
+/// Returns the bytes of a row of the table.
+std::size_t row_bytes(const RangeRow& row) {
+  return 3 * sizeof(std::uint64_t) + (1 + row.group_bytes.size()) * sizeof(RecordsDigest);
+}
+
+/// Returns the checksum of the rows of a range.
+std::uint64_t checksum_of(std::span<const std::byte> rows, std::uint64_t plan, std::size_t range,
+                          std::uint64_t first_row) {
+  const std::array<std::uint64_t, 3> whose{plan, range, first_row};
+  return xxh3_64(rows, xxh3_64(std::as_bytes(std::span(whose))));
+}
 
 /// Says whether a container may hold a point.
 bool fits_container(const PointRecord& point) noexcept {
@@ -35,7 +60,7 @@ std::size_t RangeRow::bytes() const noexcept {
 }
 
 std::uint64_t RangeWriter::least_memory(std::size_t ranges, const RangeRow& row) {
-  return (ranges + 2) * kMinBlock * row.bytes();
+  return (ranges + kMoreBlocks) * kMinBlock * row.bytes();
 }
 
 RangeWriter::RangeWriter(const std::filesystem::path& target, std::uint64_t plan,
@@ -50,21 +75,23 @@ RangeWriter::RangeWriter(const std::filesystem::path& target, std::uint64_t plan
       open_(cuts.size() + 1) {
   if (memory_bytes < least_memory(open_.size(), row_))
     throw std::invalid_argument("RangeWriter: too little memory");
-  // Two blocks more are on their way to the file
-  const std::uint64_t points = memory_bytes / ((open_.size() + 2) * row_.bytes());
+  const std::uint64_t points = memory_bytes / ((open_.size() + kMoreBlocks) * row_.bytes());
   block_points_ = static_cast<std::size_t>(std::min<std::uint64_t>(points, kMaxBlock));
   for (Arena& arena : packed_) arena = Arena(direct_blocks(block_points_ * row_.bytes()));
 }
 
 std::size_t RangeWriter::range_of(const MortonKey& key) const {
+  const bool in_last =
+      (last_ == 0 || cuts_[last_ - 1] <= key) && (last_ == cuts_.size() || key < cuts_[last_]);
+  if (in_last) return last_;
   return static_cast<std::size_t>(std::ranges::upper_bound(cuts_, key) - cuts_.begin());
 }
 
 void RangeWriter::add(std::span<const PointRecord> points,
                       std::span<const std::vector<PointRecord>> values) {
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::size_t range = range_of(points[i].key);
-    Open& open = open_[range];
+    last_ = range_of(points[i].key);
+    Open& open = open_[last_];
     if (open.points.capacity() == 0) {
       open.points.reserve(block_points_);
       open.values.resize(block_points_ * (row_.bytes() - sizeof(PointRecord)));
@@ -77,7 +104,7 @@ void RangeWriter::add(std::span<const PointRecord> points,
       to += block_points_ * bytes;
     }
     open.points.push_back(points[i]);
-    if (open.points.size() == block_points_) flush(range);
+    if (open.points.size() == block_points_) flush(last_);
   }
 }
 
@@ -86,15 +113,19 @@ void RangeWriter::flush(std::size_t range) {
   const std::size_t count = open.points.size();
   if (count == 0) return;
   const std::span<std::byte> bytes(packed_[turn_].data(), count * row_.bytes());
+  std::vector<RecordsDigest> digests{digest_of(open.points)};
   std::memcpy(bytes.data(), open.points.data(), count * sizeof(PointRecord));
   std::byte* to = bytes.data() + count * sizeof(PointRecord);
   const std::byte* from = open.values.data();
   for (const std::size_t size : row_.group_bytes) {
     std::memcpy(to, from, count * size);
+    unpack_values(open.points, from, size, unpacked_);
+    digests.push_back(digest_of(unpacked_));
     to += count * size;
     from += block_points_ * size;
   }
-  blocks_.push_back({static_cast<std::uint32_t>(range), end_, count, xxh3_64(bytes)});
+  blocks_.push_back(
+      {static_cast<std::uint32_t>(range), end_, count, xxh3_64(bytes), std::move(digests)});
   open.points.clear();
   write({bytes.data(), direct_blocks(bytes.size())});
   turn_ = 1 - turn_;
@@ -107,79 +138,127 @@ void RangeWriter::write(std::span<const std::byte> bytes) {
   end_ += bytes.size();
 }
 
+void RangeWriter::write_table() {
+  // Make the rows, range by range, and the index
+  std::ranges::stable_sort(blocks_, {}, &RangeBlock::range);
+  StateWriter index;
+  std::vector<std::byte> bytes;
+  std::uint64_t rows = 0;
+  auto block = blocks_.begin();
+  for (std::size_t range = 0; range < open_.size(); ++range) {
+    const std::uint64_t first = rows;
+    StateWriter own;
+    for (; block != blocks_.end() && block->range == range; ++block, ++rows) {
+      own.put(block->offset);
+      own.put(block->points);
+      own.put(block->xxh3);
+      for (const RecordsDigest& digest : block->digests) {
+        own.put(digest[0]);
+        own.put(digest[1]);
+      }
+    }
+    const std::vector<std::byte> row_bytes = own.take();
+    index.put(first);
+    index.put(checksum_of(row_bytes, plan_, range, first));
+    bytes.insert(bytes.end(), row_bytes.begin(), row_bytes.end());
+  }
+  index.put(rows);
+  index.put(std::uint64_t{0});
+
+  // Write them, and behind them where they are
+  StateWriter end;
+  end.put(plan_);
+  end.put(end_);
+  end.put(end_ + bytes.size());
+  end.put(std::uint64_t{open_.size()});
+  std::vector<std::byte> last = end.take();
+  end.put(xxh3_64(last));
+  const std::vector<std::byte> checksum = end.take();
+  last.insert(last.end(), checksum.begin(), checksum.end());
+  const std::vector<std::byte> entries = index.take();
+  bytes.insert(bytes.end(), entries.begin(), entries.end());
+  Arena whole(direct_blocks(bytes.size() + kEndBytes));
+  std::ranges::copy(bytes, whole.data());
+  std::ranges::copy(last, whole.data() + whole.size() - kEndBytes);
+  write({whole.data(), whole.size()});
+  writing_.get();
+}
+
 void RangeWriter::finish() {
   for (std::size_t range = 0; range < open_.size(); ++range) flush(range);
-  StateWriter table;
-  table.put(plan_);
-  table.put(std::uint64_t{blocks_.size()});
-  for (const RangeBlock& block : blocks_) {
-    table.put(block.range);
-    table.put(block.offset);
-    table.put(block.points);
-    table.put(block.xxh3);
-  }
-  const std::vector<std::byte> bytes = table.take();
-
-  // The place of the table ends the file
-  Arena last(direct_blocks(bytes.size() + kEndBytes));
-  StateWriter place;
-  place.put(end_);
-  place.put(std::uint64_t{bytes.size()});
-  place.put(xxh3_64(bytes));
-  const std::vector<std::byte> end = place.take();
-  std::ranges::copy(bytes, last.data());
-  std::ranges::copy(end, last.data() + last.size() - end.size());
-  write({last.data(), last.size()});
-  writing_.get();
-
-  // Publish it
+  write_table();
   file_.sync();
   std::filesystem::rename(partial_, target_);
   sync_directory(target_);
 }
 
-std::vector<RangeBlock> read_range(const std::filesystem::path& path, std::uint64_t plan,
-                                   const RangeRow& row, std::uint32_t range) {
+std::vector<RangeBlock> read_ranges(const std::filesystem::path& path, std::uint64_t plan,
+                                    const RangeRow& row, std::size_t first, std::size_t end) {
   const std::string name = path.string();
   const auto require = [&](bool holds, const char* what) {
     if (!holds) throw DataError(name + ": " + what);
   };
-  // Find the table
   const InputFile file(path);
+  const auto read = [&](std::uint64_t offset, std::uint64_t count) {
+    std::vector<std::byte> bytes(static_cast<std::size_t>(count));
+    file.read_at(offset, bytes);
+    return bytes;
+  };
+  // Find rows and index
   require(file.size() >= kEndBytes, "the file is shorter than it was");
-  std::vector<std::byte> end(kEndBytes);
-  file.read_at(file.size() - kEndBytes, end);
-  StateReader places(end, name, file.size() - kEndBytes);
-  const auto offset = places.get<std::uint64_t>(), length = places.get<std::uint64_t>(),
-             xxh3 = places.get<std::uint64_t>();
-  require(offset <= file.size() - kEndBytes && length <= file.size() - kEndBytes - offset,
+  const std::uint64_t end_at = file.size() - kEndBytes;
+  const std::vector<std::byte> last = read(end_at, kEndBytes);
+  StateReader places(last, name, end_at);
+  const auto own_plan = places.get<std::uint64_t>(), rows_at = places.get<std::uint64_t>(),
+             index_at = places.get<std::uint64_t>(), ranges = places.get<std::uint64_t>();
+  require(places.get<std::uint64_t>() == xxh3_64(std::span(last).first(kEndBytes - 8)) &&
+              rows_at <= index_at && index_at <= end_at &&
+              ranges < (end_at - index_at) / kIndexBytes,
           "the end of the file is damaged");
+  require(own_plan == plan, "the file is of another plan");
+  require(first <= end && end <= ranges, "the file has fewer ranges");
 
-  // Read it
-  std::vector<std::byte> bytes(static_cast<std::size_t>(length));
-  file.read_at(offset, bytes);
-  require(xxh3_64(bytes) == xxh3, "the table of the file is damaged");
-  StateReader table(bytes, name, offset);
-  require(table.get<std::uint64_t>() == plan, "the file is of another plan");
-  std::vector<RangeBlock> blocks;
-  for (std::uint64_t left = table.get_count(length); left > 0; --left) {
-    RangeBlock block;
-    block.range = table.get<std::uint32_t>();
-    block.offset = table.get_count(offset);
-    block.points = table.get_count((offset - block.offset) / row.bytes());
-    block.xxh3 = table.get<std::uint64_t>();
-    if (block.range == range) blocks.push_back(block);
+  // Read the index of the ranges
+  const std::uint64_t most = (index_at - rows_at) / row_bytes(row);
+  const std::uint64_t own_at = index_at + first * kIndexBytes;
+  const std::vector<std::byte> index = read(own_at, (end - first + 1) * kIndexBytes);
+  StateReader entries(index, name, own_at);
+  std::vector<std::uint64_t> begin, xxh3;
+  for (std::size_t i = first; i <= end; ++i) {
+    begin.push_back(entries.get_count(most));
+    xxh3.push_back(entries.get<std::uint64_t>());
   }
-  table.end();
+  require(std::ranges::is_sorted(begin), "the index of the file is damaged");
+
+  // Read their rows
+  const std::uint64_t offset = rows_at + begin.front() * row_bytes(row);
+  const std::vector<std::byte> bytes =
+      read(offset, (begin.back() - begin.front()) * row_bytes(row));
+  StateReader rows(bytes, name, offset);
+  std::vector<RangeBlock> blocks;
+  for (std::size_t i = 0; i < end - first; ++i) {
+    const auto own = std::span(bytes).subspan((begin[i] - begin.front()) * row_bytes(row),
+                                              (begin[i + 1] - begin[i]) * row_bytes(row));
+    require(checksum_of(own, plan, first + i, begin[i]) == xxh3[i],
+            "the table of the file is damaged");
+    for (std::uint64_t at = begin[i]; at < begin[i + 1]; ++at) {
+      RangeBlock block{.range = static_cast<std::uint32_t>(first + i)};
+      block.offset = rows.get_count(rows_at);
+      block.points = rows.get_count((rows_at - block.offset) / row.bytes());
+      block.xxh3 = rows.get<std::uint64_t>();
+      for (std::size_t set = 0; set <= row.group_bytes.size(); ++set) {
+        const auto low = rows.get<std::uint64_t>();
+        block.digests.push_back({low, rows.get<std::uint64_t>()});
+      }
+      blocks.push_back(std::move(block));
+    }
+  }
   return blocks;
 }
 
 RangeReader::RangeReader(const std::filesystem::path& path, RangeRow row,
-                         std::vector<RangeBlock> blocks)
-    : path_(path),
-      file_(path, DirectFile::Kept::found),
-      row_(std::move(row)),
-      blocks_(std::move(blocks)) {}
+                         std::span<const RangeBlock> blocks)
+    : path_(path), file_(path, DirectFile::Kept::found), row_(std::move(row)), blocks_(blocks) {}
 
 bool RangeReader::next() {
   if (at_ == blocks_.size()) return false;
@@ -192,8 +271,7 @@ bool RangeReader::next() {
     throw DataError(path_.string() + ": offset " + std::to_string(block.offset) +
                     ": a block is damaged");
   }
-  points_.resize(count);
-  std::memcpy(points_.data(), bytes_.data(), count * sizeof(PointRecord));
+  points_ = {reinterpret_cast<const PointRecord*>(bytes_.data()), count};
   for (std::size_t i = 0; i < count; ++i) {
     if (!fits_container(points_[i])) {
       throw DataError(fmt::format(
@@ -209,7 +287,7 @@ std::uint64_t RangeReader::sample_keys(std::uint64_t first, std::uint64_t every,
                                        std::vector<MortonKey>& keys) {
   constexpr std::uint64_t kPiece = 96;  // points that are read together
   constexpr std::size_t kStep = 12;     // from one key to the next
-  points_.clear();
+  points_ = {};
   for (const RangeBlock& block : blocks_) {
     for (; first < block.points; first += every) {
       const auto count = static_cast<std::size_t>(std::min(kPiece, block.points - first));
@@ -229,14 +307,10 @@ std::uint64_t RangeReader::sample_keys(std::uint64_t first, std::uint64_t every,
 }
 
 void RangeReader::values(std::size_t group, std::vector<PointRecord>& records) const {
-  const std::size_t count = points_.size(), bytes = row_.group_bytes[group];
+  const std::size_t count = points_.size();
   const std::byte* from = bytes_.data() + count * sizeof(PointRecord);
   for (std::size_t i = 0; i < group; ++i) from += count * row_.group_bytes[i];
-  records.assign(count, {});
-  for (std::size_t i = 0; i < count; ++i, from += bytes) {
-    records[i].key = points_[i].key;
-    std::memcpy(values_of(records[i]), from, bytes);
-  }
+  unpack_values(points_, from, row_.group_bytes[group], records);
 }
 
 }  // namespace ptc

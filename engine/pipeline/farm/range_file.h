@@ -1,6 +1,10 @@
 // The points that a task of a farm has sorted into ranges of the curve, in one file.
 //
-//   block | block | ... | table: range, offset, points and checksum of each block | its place
+//   block | block | ... | rows of range 0, of range 1, ... | index: rows and checksum of each range
+//   | end
+//
+// A row has offset, points, checksum and digests of a block. Who wants some ranges reads their part
+// of the index, their rows and their blocks, however many others there are.
 //
 // Blocks begin at multiples of kDirectBytes and pass by the page cache: they are read once, by
 // other machines. A file system that has no direct transfers gets usual ones.
@@ -19,6 +23,7 @@
 #include "engine/base/memory.h"
 #include "engine/io/file/file.h"
 #include "engine/sort/direct_file.h"
+#include "engine/sort/records_digest.h"
 #include "format/morton.h"
 #include "format/point_record.h"
 
@@ -37,6 +42,8 @@ struct RangeBlock {
   std::uint64_t offset = 0;  ///< bytes from the start of the file
   std::uint64_t points = 0;
   std::uint64_t xxh3 = 0;  ///< of its bytes
+  /// Of its records, and of the values of each group with the keys of their points.
+  std::vector<RecordsDigest> digests;
 };
 
 /// Writes the points of an input by range.
@@ -68,6 +75,7 @@ class RangeWriter {
   [[nodiscard]] std::size_t range_of(const MortonKey& key) const;
   void flush(std::size_t range);
   void write(std::span<const std::byte> bytes);
+  void write_table();
 
   std::filesystem::path target_, partial_;
   TemporaryName temporary_;  ///< removes what was not published
@@ -78,29 +86,32 @@ class RangeWriter {
   RangeRow row_;
   std::size_t block_points_;
   std::vector<Open> open_;
-  std::array<Arena, 2> packed_;  ///< a block on its way to the file, and the one before
+  std::size_t last_ = 0;  ///< range of the last point: the next one is often in it, too
+  std::vector<PointRecord> unpacked_;  ///< values of a block, for their digest
+  std::array<Arena, 2> packed_;        ///< a block on its way to the file, and the one before
   std::size_t turn_ = 0;
   std::vector<RangeBlock> blocks_;
   std::future<void> writing_;  ///< last, so that its end is awaited before the other members go
 };
 
-/// Returns the blocks of a range, in the order of the file. This reads the table of all blocks.
+/// Returns the blocks of some ranges: range by range, in the order of the file.
+/// @param first, end  numbers of the first range, and of the one behind the last
 /// @throws DataError when the file is damaged or of another plan; std::system_error
-[[nodiscard]] std::vector<RangeBlock> read_range(const std::filesystem::path& path,
-                                                 std::uint64_t plan, const RangeRow& row,
-                                                 std::uint32_t range);
+[[nodiscard]] std::vector<RangeBlock> read_ranges(const std::filesystem::path& path,
+                                                  std::uint64_t plan, const RangeRow& row,
+                                                  std::size_t first, std::size_t end);
 
-/// Reads the points of one range.
+/// Reads the points of some blocks.
 class RangeReader {
  public:
-  /// @param blocks  of read_range()
+  /// @param blocks  some of read_ranges(); they must outlive this
   /// @throws std::system_error
-  RangeReader(const std::filesystem::path& path, RangeRow row, std::vector<RangeBlock> blocks);
+  RangeReader(const std::filesystem::path& path, RangeRow row, std::span<const RangeBlock> blocks);
 
-  /// Reads the next block of the range. @return whether there was one
+  /// Reads the next block. @return whether there was one
   /// @throws DataError when it is damaged, or has a point that a container cannot hold
   [[nodiscard]] bool next();
-  /// The points of the block.
+  /// The points of the block, until the next one is read.
   [[nodiscard]] std::span<const PointRecord> block() const noexcept { return points_; }
   /// Writes the values of a group into records that have the keys of the block's points.
   void values(std::size_t group, std::vector<PointRecord>& records) const;
@@ -109,7 +120,7 @@ class RangeReader {
   /// are spread, a part need not read all of them. There is no block afterwards.
   /// @param first  points from the first one to the first piece
   /// @param every  points from one piece to the next, 1 or more
-  /// @return       points from the end of the range to the next piece: `first` for another file
+  /// @return       points from the end of the blocks to the next piece: `first` for another file
   [[nodiscard]] std::uint64_t sample_keys(std::uint64_t first, std::uint64_t every,
                                           std::vector<MortonKey>& keys);
 
@@ -117,10 +128,10 @@ class RangeReader {
   std::filesystem::path path_;
   DirectFile file_;
   RangeRow row_;
-  std::vector<RangeBlock> blocks_;
+  std::span<const RangeBlock> blocks_;
   std::size_t at_ = 0;
   Arena bytes_;
-  std::vector<PointRecord> points_;
+  std::span<const PointRecord> points_;  ///< in bytes_
 };
 
 }  // namespace ptc

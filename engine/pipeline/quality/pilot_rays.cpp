@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFall = 0.6;  // the noise of n rays falls as n^-0.6
 // Rays of a result: in the first attempt, and at most
-constexpr unsigned kFirst = 256, kMost = 16384;
+constexpr unsigned kFirstPilotRays = 256, kMostPilotRays = 16384;
 // Seeds of the second attempt, which must not know the first
 constexpr std::uint64_t kSecondSeed = std::uint64_t{1} << 33;
 
@@ -87,12 +87,13 @@ std::vector<unsigned> share_rays(std::span<const Noisy> receivers, double asked)
   double weights = 0, sum = 0;
   for (const Noisy& one : receivers) {
     weights += one.weight;
-    if (one.square > 0) sum += one.weight * one.square * std::pow(kFirst / shape(one), kPower);
+    if (one.square > 0)
+      sum += one.weight * one.square * std::pow(kFirstPilotRays / shape(one), kPower);
   }
   const double scale = std::pow(sum / (weights * asked * asked), 1 / kPower);
   std::vector<unsigned> rays;
   for (const Noisy& one : receivers) {
-    const double wanted = std::clamp<double>(scale * shape(one), kFirst, kMost);
+    const double wanted = std::clamp<double>(scale * shape(one), kFirstPilotRays, kMostPilotRays);
     // To the nearest power of 2: few numbers are traced together
     rays.push_back(std::bit_ceil(static_cast<unsigned>(wanted / std::numbers::sqrt2)));
   }
@@ -122,7 +123,7 @@ PilotRays trace_evenly(std::span<const Pilot> pilots, unsigned rays, RayShader& 
 
 PilotRays trace_for(std::span<const Pilot> pilots, double asked, RayShader& discs,
                     Progress& progress) {
-  PilotRays result = trace_evenly(pilots, kFirst, discs, progress);
+  PilotRays result = trace_evenly(pilots, kFirstPilotRays, discs, progress);
   const double noise = noise_of(pilots, result.traced);
   if (noise <= asked) return result;
   // All anew: those that seem to have little noise may have met it by chance
