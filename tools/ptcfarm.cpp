@@ -206,7 +206,8 @@ void declare_pictures(CLI::App& app, std::string& pictures) {
                  "Also render pictures of the scene, with these options of ptcrender\n"
                  "OPTIONS is one text, quoted as a shell has it, such as \"-o turn.##.exr "
                  "--turntable 48 --size 960x540\". Each frame is a task of its own. The scene and "
-                 "the resources are those of the plan.")
+                 "the resources are those of the plan. For each bounce but the last, tasks light "
+                 "all parts once more, unless --shade has other bounces.")
       ->type_name("OPTIONS")
       ->group("Pictures");
 }
@@ -269,12 +270,18 @@ ptc::FarmFrames frames_of(const std::string& text, const std::filesystem::path& 
   } catch (const CLI::ParseError& error) {
     refuse_pictures(error.what());
   }
-  const ptc::RenderArguments& arguments = pictures->arguments;
+  ptc::RenderArguments& arguments = pictures->arguments;
   if (arguments.scenes() != 1 || std::ranges::find(words, "--") != words.end())
     refuse_pictures("the pictures are of the scene of the plan: name no other one");
+  if (arguments.has_light_groups())
+    refuse_pictures("--light-groups needs a scene in one file, and that of a plan has parts");
+  const ptc::LightingRequest& lighting = arguments.lighting(pictures->command);
+  if (lighting.tolerate_damage && lighting.bounces > 1)
+    refuse_pictures("--tolerate-damage excludes --bounces above 1, which need every point");
 
   // Take what tasks need, and leave the frames out
   ptc::FarmFrames frames{.directory = std::filesystem::current_path(),
+                         .lighting = lighting,
                          .seconds = arguments.expected_seconds()};
   for (std::size_t i = 0; i < words.size(); ++i) {
     if (words[i].starts_with("--frames=")) continue;
@@ -318,6 +325,12 @@ void render_frame(const ptc::FarmPlan& plan, const ptc::FarmTask& task, const pt
     pictures.emplace(plan.scene, words);
   } catch (const CLI::ParseError& error) {
     throw ptc::DataError(fmt::format("{}: its pictures: {}", plan.file.string(), error.what()));
+  }
+  if (plan.renders_bounces()) {
+    if (!ptc::has_same_bounces(pictures->arguments.lighting(pictures->command), frames.lighting))
+      throw ptc::DataError(plan.file.string() + ": its pictures have other bounces than it says");
+    const unsigned wave = frames.lighting.bounces - 1;
+    pictures->arguments.use_bounces(plan.output({ptc::TaskKind::join_bounce, wave}, 0));
   }
   static_cast<void>(pictures->arguments.render(pictures->command, own, progress));
 }

@@ -111,6 +111,11 @@ void RenderArguments::declare_lights(CLI::App& app) {
   add_light_sampling(app, request_.light_sampling);
 }
 
+const LightingRequest& RenderArguments::lighting(Command& command) {
+  apply_preset(command.app(), preset_, request_);
+  return request_;
+}
+
 double RenderArguments::expected_seconds() const {
   constexpr double kSampleSeconds = 2e-4;  // several times what a view of a city takes
   const std::array<unsigned, 2> size = camera_.size().value_or(std::array<unsigned, 2>{1920, 1080});

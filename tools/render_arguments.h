@@ -27,8 +27,14 @@ class RenderArguments {
   [[nodiscard]] std::vector<std::filesystem::path> targets() const;
   /// Says whether an exposure was given.
   [[nodiscard]] bool has_exposure() const { return request_.exposure.has_value(); }
+  /// Says whether groups of lights are kept apart.
+  [[nodiscard]] bool has_light_groups() const { return request_.light_groups; }
   /// The number of scenes that were given.
   [[nodiscard]] std::size_t scenes() const { return scene_.names().size(); }
+  /// Returns what is asked of the light.
+  [[nodiscard]] const LightingRequest& lighting(Command& command);
+  /// Takes the light of all bounces but the last from LightingRequest::bounced.
+  void use_bounces(const std::filesystem::path& bounced) { request_.bounced = bounced; }
   /// Returns about how long a picture takes, seconds of one core.
   [[nodiscard]] double expected_seconds() const;
 

@@ -31,7 +31,8 @@ CHANNELS = ["x", "y", "z", "nx", "ny", "nz", "radius", "radiance_r", "radiance_g
 # As a plan has a channel, without components
 CHANNEL = {"name": "a", "type": 1, "components": 0, "group": 2, "role": 0, "colour_space": 0, "unit": "", "scale": 1, "offset": 0,
            "size": 0}
-FRAMES = {"options": [], "directory": "/", "targets": ["/a.exr"]}
+FRAMES = {"options": [], "directory": "/", "targets": ["/a.exr"], "bounces": 1, "lift": 0.15, "solid_angle": 0.05, "parallax": 0.2,
+          "inflation": 1, "resolution": 16, "sides": 0}
 
 
 class Farm(ProgramTest):
@@ -669,6 +670,7 @@ class Farm(ProgramTest):
         lost.unlink()
         self.run_plan()
         self.assertEqual(lost.read_bytes(), before)
+        self.assertEqual([path.name for path in folder.iterdir() if path.name.startswith(("bounce", "shade"))], [])
         self.assertEqual(self.run_plan()["ran"], 0)
         # As tiles they are what one file is
         self.succeed("ptcconvert", one, self.here / "one.las")
@@ -765,7 +767,8 @@ class Farm(ProgramTest):
                             ("-o a.##.png --turntable 3", "give --exposure"), ("-o a.exr --memory 1G", "--memory"),
                             ("-o gone/a.exr", "no such folder"), (f"{self.scene} -o a.exr", "name no other one"), ("-o a.exr --", "name no other one"),
                             ("-o 'a.exr", "words of a shell"), ("-o a.exr; true", "words of a shell"), ("-o $(true).exr", "words of a shell"),
-                            ("-o a.#.exr --frames 1-9x0", "frames"), ("-o a.#.exr --frames 2-1", "frames"), ("--help", "--render")):
+                            ("-o a.exr --light-groups", "a scene in one file"),
+                            ("-o a.exr --tolerate-damage --bounces 2", "need every point"), ("-o a.#.exr --frames 1-9x0", "frames"), ("-o a.#.exr --frames 2-1", "frames"), ("--help", "--render")):
             with self.subTest(words):
                 self.assertIn(said, self.fail_with(2, *plan, words, cwd=self.here))
         path = self.here / "farm.json"
@@ -773,6 +776,59 @@ class Farm(ProgramTest):
         changed["frames"]["options"].append("--help")
         path.write_text(json.dumps(changed))
         self.assertEqual(run("ptcfarm", "run", path).returncode, 1)
+
+    def test_bounces_of_pictures_are_waves_of_tasks(self):
+        coarse = " ".join(map(str, self.COARSE))
+        options = f"-o p.##.exr --frames 1-2 --size 32x24 --samples 1 --turntable 3 --bounces 3 {coarse}"
+
+        def bounces():
+            return [path.name for path in (self.here / "farm.parts").iterdir() if path.name.startswith("bounce")]
+
+        def check(waves, *shade):
+            tasks = self.plan("--city", "20k", *shade, "--render", options, parts=2)["tasks"]
+            self.assertEqual(sum(task["name"].startswith("join_bounce") for task in tasks), waves)
+            self.run_plan()
+            self.assertEqual(bounces(), [])
+            for name in pictures:
+                self.assertTrue((self.here / name).read_bytes() == (self.here / f"one.{name}").read_bytes(), (name, shade))
+
+        # Without shading; a lost picture needs the bounces once more
+        home = os.getcwd()
+        os.chdir(self.here)
+        self.addCleanup(os.chdir, home)
+        self.succeed("ptcbuild", "--city", "20k", "-o", "one.ptcx")
+        self.succeed("ptcrender", "one.ptcx", *options.replace("p.##", "one.p.##").split())
+        pictures = ["p.01.exr", "p.02.exr"]
+        check(2)
+        (self.here / pictures[0]).unlink()
+        self.assertEqual(self.run_plan()["ran"], 2 * 3 + 1)
+        self.assertEqual(bounces(), [])
+        # Beside shading with the same settings, and with others, whose bounces are not those of the pictures
+        self.succeed("ptcshade", "one.ptcx", "-o", "one.ply", "--bounces", 2, *self.COARSE)
+        check(2, "--shade", "lit.ply", "--bounces", 2, *self.COARSE)
+        self.assertTrue((self.here / "lit.ply").read_bytes() == (self.here / "one.ply").read_bytes())
+        check(1, "--shade", "lit.ply", "--bounces", 2, *self.COARSE, "--lift", 0.3)
+        # A picture reads the bounces of the tasks, as many as it has
+        plan = self.plan("--city", "20k", "--render", options, parts=2)
+        for task in plan["tasks"][:-2]:
+            self.succeed(*task["command"])
+        for name, code in (("bounce_2.ptcx", 1), ("bounce_1.ptcx", 0)):
+            path = self.here / "farm.parts" / name
+            kept = path.read_bytes()
+            path.write_bytes(kept[:100])
+            failed = run(*plan["tasks"][-2]["command"])
+            self.assertEqual(failed.returncode, code, failed.stderr)
+            path.write_bytes(kept)
+        # The last one removes them; so does one that is done, when the one that did it was killed before
+        self.succeed(*plan["tasks"][-1]["command"])
+        self.assertEqual(bounces(), [])
+        (self.here / "farm.parts" / "bounce_1.ptcx").write_bytes(b"")
+        self.succeed(*plan["tasks"][-1]["command"])
+        self.assertEqual(bounces(), [])
+        plan["frames"]["bounces"] = 2
+        plan["tasks"] = [task for task in plan["tasks"] if task["wave"] != 2]
+        (self.here / "farm.json").write_text(json.dumps(plan))
+        self.assertIn("other bounces than it says", run("ptcfarm", "run", "farm.json").stderr)
 
     def test_a_cap_below_that_of_a_task_is_refused(self):
         self.plan("--city", "30k")

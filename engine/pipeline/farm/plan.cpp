@@ -136,6 +136,7 @@ void check_frames(const FarmPlan& plan) {
             "the name of a picture has no mark for the number of a frame");
   }
   require(plan, !frames.targets.empty() && frames.directory.is_absolute(), "it has no pictures");
+  check_ranges(frames.lighting);
   if (!frames.range) return;
   try {
     check_sequence({.frames = *frames.range});

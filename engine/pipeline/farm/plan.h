@@ -8,7 +8,7 @@
 //   shade.0 ...      a range of the scene's points --> their light      scene.parts/shade.0
 //   collect          the light of all ranges --> shaded points          shaded.ply
 //                    (where ranges have files of their own: nothing)
-//   frame.0 ...      the scene --> a picture                            turn.0001.exr
+//   frame.0 ...      the scene, its bounces --> a picture               turn.0001.exr
 //
 // A scene that is lit is built under another name first, and so is one for each bounce but the
 // last:
@@ -129,6 +129,8 @@ struct FarmFrames {
   /// Files of a picture, at least one; of a sequence as for frame_name().
   std::vector<std::filesystem::path> targets;
   std::optional<FrameRange> range;  ///< empty: one picture
+  /// The number of bounces, and the gather and the lift of those that light all points.
+  LightingRequest lighting;
   double seconds = 120;  ///< expected for a picture, on one core; a plan keeps it by task
 
   /// Returns the number of pictures.
@@ -189,8 +191,14 @@ struct FarmPlan {
   [[nodiscard]] bool has_tiles() const;
   /// Returns how many points are shaded, about. @pre shading
   [[nodiscard]] std::uint64_t shaded_points() const;
-  /// Returns how many bounces are made of all points before a range is shaded.
+  /// Returns how many bounces tasks make of all points, for ranges that are shaded and for
+  /// pictures.
   [[nodiscard]] unsigned waves() const noexcept;
+  /// Says whether pictures are lit by bounces that tasks made: they have more than one, with the
+  /// settings of those that the shading needs, if it does.
+  [[nodiscard]] bool renders_bounces() const noexcept;
+  /// Returns the settings of the bounces that tasks make. @pre waves() > 0
+  [[nodiscard]] const LightingRequest& bounce_settings() const noexcept;
   /// Returns the files of a picture. @pre frames
   [[nodiscard]] std::vector<std::filesystem::path> pictures(std::size_t number) const;
   /// Returns the first file that a task writes.
@@ -201,6 +209,9 @@ struct FarmPlan {
   /// Returns what a point takes in a file of ranges.
   [[nodiscard]] RangeRow row() const;
 };
+
+/// Says whether two runs have as many bounces, and light the points alike before the last one.
+[[nodiscard]] bool has_same_bounces(const LightingRequest& a, const LightingRequest& b);
 
 /// Measures the inputs and plans the tasks. Points are read once.
 /// @param request  what to build. Inputs are clouds and containers whose points have normals and

@@ -150,24 +150,40 @@ LightRequest lighting_of(const OrderedJson& json) {
   return lighting;
 }
 
+/// Adds the settings of a gather, and the lift of its receivers.
+void put_gather(OrderedJson& json, const LightingRequest& request) {
+  const GatherOptions& gather = request.gather;
+  json["bounces"] = request.bounces;
+  json["lift"] = request.lift;
+  json["solid_angle"] = gather.solid_angle;
+  json["parallax"] = gather.parallax;
+  json["inflation"] = gather.inflation;
+  json["resolution"] = gather.resolution;
+  json["sides"] = static_cast<unsigned>(gather.sides);
+}
+
+/// Reads them.
+void get_gather(const OrderedJson& json, LightingRequest& request) {
+  GatherOptions& gather = request.gather;
+  request.bounces = json.at("bounces");
+  request.lift = json.at("lift");
+  gather.solid_angle = json.at("solid_angle");
+  gather.parallax = json.at("parallax");
+  gather.inflation = json.at("inflation");
+  gather.resolution = json.at("resolution");
+  if (json.at("sides").get<unsigned>() > static_cast<unsigned>(Sides::front))
+    throw DataError("there are no such sides");
+  gather.sides = static_cast<Sides>(json.at("sides").get<unsigned>());
+}
+
 OrderedJson to_json(const FarmShading& shading) {
   const ShadeRequest& request = shading.request;
-  const GatherOptions& gather = request.gather;
-  const Surroundings& around = gather.around;
-  OrderedJson json{{"target", shading.target.string()},
-                   {"ranges", shading.ranges},
-                   {"bounces", request.bounces},
-                   {"count", request.count},
-                   {"colour_from", request.colour_from},
-                   {"lift", request.lift},
-                   {"solid_angle", gather.solid_angle},
-                   {"parallax", gather.parallax},
-                   {"inflation", gather.inflation},
-                   {"resolution", gather.resolution},
-                   {"sides", static_cast<unsigned>(gather.sides)},
-                   {"sphere", around.sphere},
-                   {"cone", around.cone},
-                   {"falloff", around.falloff}};
+  const Surroundings& around = request.gather.around;
+  OrderedJson json{
+      {"target", shading.target.string()},  {"ranges", shading.ranges}, {"count", request.count},
+      {"colour_from", request.colour_from}, {"sphere", around.sphere},  {"cone", around.cone},
+      {"falloff", around.falloff}};
+  put_gather(json, request);
   if (std::isfinite(around.distance)) json["distance"] = around.distance;
   if (request.error) json["error"] = *request.error;
   return json;
@@ -178,22 +194,14 @@ FarmShading shading_of(const OrderedJson& json) {
   shading.target = json.at("target").get<std::string>();
   shading.ranges = json.at("ranges");
   ShadeRequest& request = shading.request;
-  request.bounces = json.at("bounces");
   request.count = json.at("count");
   request.colour_from = json.at("colour_from");
-  request.lift = json.at("lift");
-  GatherOptions& gather = request.gather;
-  gather.solid_angle = json.at("solid_angle");
-  gather.parallax = json.at("parallax");
-  gather.inflation = json.at("inflation");
-  gather.resolution = json.at("resolution");
-  if (json.at("sides").get<unsigned>() > static_cast<unsigned>(Sides::front))
-    throw DataError("there are no such sides");
-  gather.sides = static_cast<Sides>(json.at("sides").get<unsigned>());
-  gather.around.sphere = json.at("sphere");
-  gather.around.cone = json.at("cone");
-  gather.around.falloff = json.at("falloff");
-  if (json.contains("distance")) gather.around.distance = json.at("distance");
+  get_gather(json, request);
+  Surroundings& around = request.gather.around;
+  around.sphere = json.at("sphere");
+  around.cone = json.at("cone");
+  around.falloff = json.at("falloff");
+  if (json.contains("distance")) around.distance = json.at("distance");
   if (json.contains("error")) request.error = json.at("error").get<double>();
   return shading;
 }
@@ -202,6 +210,7 @@ OrderedJson to_json(const FarmFrames& frames) {
   OrderedJson json{{"options", frames.options},
                    {"directory", frames.directory.string()},
                    {"targets", to_json(frames.targets)}};
+  put_gather(json, frames.lighting);
   if (frames.range) json["range"] = {frames.range->first, frames.range->last, frames.range->step};
   return json;
 }
@@ -212,6 +221,7 @@ FarmFrames frames_of(const OrderedJson& json) {
                     .targets = {}};
   for (const OrderedJson& target : json.at("targets"))
     frames.targets.emplace_back(target.get<std::string>());
+  get_gather(json, frames.lighting);
   if (json.contains("range")) {
     const auto range = json.at("range").get<std::array<std::int64_t, 3>>();
     frames.range = {range[0], range[1], range[2]};

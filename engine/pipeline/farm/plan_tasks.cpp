@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,13 @@ constexpr double kShadeSeconds = 1.8e-4, kCollectSeconds = 1e-6;
 constexpr double kTuneSeconds = 300;  // of the task: its pilots are as many for any scene
 constexpr std::uint64_t kFrameBytes = 10'000'000;
 constexpr std::uint64_t kStoredBytes = 26, kResultBytes = 40;
+
+/// Returns what decides how the points of a scene are lit before the last bounce.
+auto bounce_settings_of(const LightingRequest& request) {
+  const GatherOptions& gather = request.gather;
+  return std::tuple(gather.solid_angle, gather.parallax, gather.inflation, gather.resolution,
+                    gather.sides, request.lift);
+}
 
 /// Returns the files of all parts that a step writes: "unlit.*.ptcx".
 std::filesystem::path all_parts(const FarmPlan& plan, const TaskStep& step) {
@@ -114,7 +122,10 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
   TaskStep before = after;
   std::vector<std::filesystem::path> seen;
   add_final_scene(plan, seen);
-  if (plan.waves() > 0) add_scene(plan, {TaskKind::bounce, plan.waves()}, after, seen);
+  if (const unsigned bounces = plan.shading->request.bounces; bounces > 1) {
+    const unsigned wave = bounces - 1;
+    add_scene(plan, {TaskKind::bounce, wave}, {TaskKind::join_bounce, wave}, seen);
+  }
   if (plan.shading->request.error) {
     before = {TaskKind::tune};
     plan.tasks.push_back({.step = before,
@@ -138,7 +149,7 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
                    .disk_bytes = plan.shaded_points() * 2 * kResultBytes,
                    .seconds = static_cast<double>(plan.shaded_points()) * kCollectSeconds};
   std::uint64_t result_bytes = kResultBytes;
-  if (plan.has_tiles()) {  // there is nothing to collect, but the bounces go
+  if (plan.has_tiles()) {  // there is nothing to collect, but bounces may go
     result_bytes = 2 * kResultBytes;
     collect.inputs = {plan.shading->target};
     collect.disk_bytes = 0;
@@ -160,6 +171,10 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
 void add_frames(FarmPlan& plan, std::uint64_t memory_bytes) {
   std::vector<std::filesystem::path> inputs;
   add_final_scene(plan, inputs);
+  if (plan.renders_bounces()) {
+    const unsigned wave = plan.frames->lighting.bounces - 1;
+    add_scene(plan, {TaskKind::bounce, wave}, {TaskKind::join_bounce, wave}, inputs);
+  }
   const TaskStep after = plan.tasks.back().step;
   for (std::size_t i = 0; i < plan.frames->count(); ++i) {
     plan.tasks.push_back({.step = {TaskKind::frame},
@@ -214,6 +229,10 @@ std::string FarmTask::name() const {
   return one ? step.name() : fmt::format("{}.{}", step.name(), number);
 }
 
+bool has_same_bounces(const LightingRequest& a, const LightingRequest& b) {
+  return a.bounces == b.bounces && bounce_settings_of(a) == bounce_settings_of(b);
+}
+
 std::filesystem::path FarmPlan::folder() const {
   return scene.parent_path() / (scene.stem().string() + ".parts");
 }
@@ -241,7 +260,19 @@ std::uint64_t FarmPlan::shaded_points() const {
 }
 
 unsigned FarmPlan::waves() const noexcept {
-  return shading && shading->request.bounces > 1 ? shading->request.bounces - 1 : 0;
+  const unsigned shaded = shading ? shading->request.bounces : 0;
+  const unsigned bounces = renders_bounces() ? std::max(shaded, frames->lighting.bounces) : shaded;
+  return bounces > 1 ? bounces - 1 : 0;
+}
+
+bool FarmPlan::renders_bounces() const noexcept {
+  if (!frames || frames->lighting.bounces < 2) return false;
+  return !shading || shading->request.bounces < 2 ||
+         bounce_settings_of(shading->request) == bounce_settings_of(frames->lighting);
+}
+
+const LightingRequest& FarmPlan::bounce_settings() const noexcept {
+  return shading && shading->request.bounces > 1 ? shading->request : frames->lighting;
 }
 
 std::filesystem::path FarmPlan::output(const TaskStep& step, std::size_t number) const {

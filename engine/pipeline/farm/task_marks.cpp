@@ -100,32 +100,38 @@ bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& need
   return *has_output;
 }
 
-std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task) {
+std::vector<TaskKind> last_users(const FarmPlan& plan, const FarmTask& task) {
+  std::vector<TaskKind> users;
   switch (task.step.kind) {
     case TaskKind::route:
-      return TaskKind::part;
+      return {TaskKind::part};
     case TaskKind::part:
     case TaskKind::join:
-      return plan.lighting ? std::optional(TaskKind::light) : std::nullopt;
+      if (plan.lighting) users.push_back(TaskKind::light);
+      break;
     case TaskKind::shade:
-      if (plan.has_tiles()) break;
-      [[fallthrough]];
+      if (!plan.has_tiles()) users.push_back(TaskKind::collect);
+      break;
+    case TaskKind::tune:
+      return {TaskKind::collect};
     case TaskKind::bounce:
     case TaskKind::join_bounce:
-    case TaskKind::tune:
-      return TaskKind::collect;
+      if (plan.shading) users.push_back(TaskKind::collect);
+      if (plan.renders_bounces()) users.push_back(TaskKind::frame);
+      break;
     case TaskKind::light:
     case TaskKind::join_light:
     case TaskKind::collect:
     case TaskKind::frame:
       break;
   }
-  return std::nullopt;
+  return users;
 }
 
 bool TaskMarks::is_spent(const FarmTask& task) {
-  const std::optional<TaskKind> user = last_user(plan_, task);
-  return user && all_done(*user);
+  const std::vector<TaskKind> users = last_users(plan_, task);
+  return !users.empty() &&
+         std::ranges::all_of(users, [&](TaskKind user) { return all_done(user); });
 }
 
 bool TaskMarks::all_done(TaskKind kind) {

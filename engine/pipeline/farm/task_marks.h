@@ -66,7 +66,7 @@ class NotYet : public std::system_error {
 /// not be seen from this machine yet.
 /// @throws as fail_unseen() when the mark is not seen
 [[nodiscard]] bool has_output(const FarmPlan& plan, const FarmTask& task, const FarmTask& needed);
-/// Returns the kind of tasks that need the output of a task last; nothing when it stays.
-[[nodiscard]] std::optional<TaskKind> last_user(const FarmPlan& plan, const FarmTask& task);
+/// Returns the kinds of tasks that need the output of a task last; none when it stays.
+[[nodiscard]] std::vector<TaskKind> last_users(const FarmPlan& plan, const FarmTask& task);
 
 }  // namespace ptc

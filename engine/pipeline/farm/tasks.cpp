@@ -37,8 +37,8 @@ void remove_output(const FarmTask& task) {
     std::filesystem::remove(edges_path(output), gone);
 }
 
-/// Says whether what others wrote may be spent by a task: it joins or collects, or it makes a part
-/// again behind a join.
+/// Says whether what others wrote may be spent by a task: it joins or collects, it makes a part or
+/// a range again behind one that does, or it renders the last picture.
 bool may_spend(const FarmPlan& plan, const FarmTask& task, TaskMarks& marks) {
   const auto is_done = [&](const TaskStep& step) {
     const auto found = std::ranges::find(plan.tasks, step, &FarmTask::step);
@@ -53,6 +53,14 @@ bool may_spend(const FarmPlan& plan, const FarmTask& task, TaskMarks& marks) {
       return is_done({TaskKind::join});
     case TaskKind::light:
       return is_done({TaskKind::join_light});
+    case TaskKind::shade:
+      return plan.has_tiles() && is_done({TaskKind::collect});
+    case TaskKind::frame: {
+      if (!plan.renders_bounces()) return false;
+      const auto bounce =
+          std::ranges::find(plan.tasks, TaskStep{TaskKind::bounce, 1}, &FarmTask::step);
+      return bounce != plan.tasks.end() && marks.is_spent(*bounce);
+    }
     default:
       return false;
   }
@@ -117,24 +125,26 @@ bool light(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Pr
   return true;
 }
 
-/// Returns the request for so many bounces, of which tasks have made all but the last.
-ShadeRequest shading_of(const FarmPlan& plan, unsigned bounces, const RunOptions& run) {
-  ShadeRequest request = plan.shading.value().request;
+/// Completes a request for bounces, of which tasks have made all but the last.
+void use_bounces(const FarmPlan& plan, const RunOptions& run, LightingRequest& request) {
   request.scene = plan.scene;
   request.run = run;
-  request.bounces = bounces;
-  if (bounces > 1) request.bounced = plan.output({TaskKind::join_bounce, bounces - 1}, 0);
-  return request;
+  if (request.bounces > 1)
+    request.bounced = plan.output({TaskKind::join_bounce, request.bounces - 1}, 0);
 }
 
-/// Returns the request for all bounces of a plan.
+/// Returns the request for the shading of a plan.
 ShadeRequest shading_of(const FarmPlan& plan, const RunOptions& run) {
-  return shading_of(plan, plan.shading.value().request.bounces, run);
+  ShadeRequest request = plan.shading.value().request;
+  use_bounces(plan, run, request);
+  return request;
 }
 
 /// Adds a bounce to the light of a part. @return  whether it has points
 bool bounce(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress) {
-  const ShadeRequest request = shading_of(plan, task.step.wave, run);
+  ShadeRequest request{plan.bounce_settings()};
+  request.bounces = task.step.wave;
+  use_bounces(plan, run, request);
   const TaskStep parts{plan.lighting ? TaskKind::light : TaskKind::part};
   const std::optional<std::size_t> part = index_of(plan, parts, task.number, request.scene);
   if (!part) {
@@ -236,7 +246,10 @@ bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run,
   bool performed = false;
   try {
     TaskMarks marks(plan);
-    if (marks.is_done(task)) return false;
+    if (marks.is_done(task)) {
+      remove_leftovers(plan, task);  // of one that was killed before it could
+      return false;
+    }
     require_forerunners(plan, task, marks);
     forget_failure(plan, task);
     forget_other_plans(plan, task);

@@ -238,6 +238,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
     LightingReport of_picture;
     for (std::size_t i = 0; i < groups.size(); ++i) {
       one.lights = only_group(rig, groups[i]);
+      one.bounced.clear();  // of all groups together
       one.scene = lit[i]->path();
       const auto add = [&](const Film& rows, unsigned first, const Subject& subject, std::size_t) {
         if (!sum) {
