@@ -68,9 +68,9 @@ TEST_CASE("farm model: what is shared is divided among those who use it", "[benc
   hardware = free_of_limits(1, 1);
   hardware.open_seconds = 1e-3;
   const FarmTimes opening = play(kLoad, costs, hardware);
-  CHECK(opening.part == Approx(20 * (4 + 4 * 10) * 1e-3));
+  CHECK(opening.part == Approx(20 * (4 + 3 * 10) * 1e-3));
   CHECK(opening.limit == "opening files");
-  CHECK(opening.opened == Approx(10 * 4 + 20 * 44 + (4 + 40 + 10) + (4 + 20) + (4 + 1)));
+  CHECK(opening.opened == Approx(10 * 4 + 20 * 34 + (4 + 40 + 10) + (4 + 20) + (4 + 1)));
 }
 
 TEST_CASE("farm model: tasks that come one by one do not share what they use", "[bench][farm]") {

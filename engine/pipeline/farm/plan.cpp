@@ -64,14 +64,16 @@ std::size_t parts_for(const FarmPlan& plan, const FarmOptions& options) {
   return static_cast<std::size_t>(std::min<std::uint64_t>(bytes / memory + 1, kMaxParts));
 }
 
-/// Returns into how many ranges a part is divided at most: each is worth a sort of its own, and the
-/// blocks of each fill up in a route.
+/// Returns into how many ranges a part is divided at most: each is worth a sort of its own, a route
+/// has so many points of each that a part opens its file for them, and blocks of each fit in
+/// memory.
 std::size_t ranges_for(const FarmPlan& plan, const FarmOptions& options) {
   if (options.ranges > 0) return options.ranges;
-  constexpr std::uint64_t kRangePoints = 5 << 16, kBlockPoints = 1 << 13, kMost = 64;
+  constexpr std::uint64_t kRangePoints = 5 << 16, kRoutePoints = 1 << 15, kMost = 64;
+  constexpr std::uint64_t kBlockPoints = 1 << 13;
   const std::uint64_t parts = plan.parts();
   const std::uint64_t by_sort = plan.points / parts / kRangePoints;
-  const std::uint64_t by_route = plan.points / plan.inputs.size() / parts / kBlockPoints;
+  const std::uint64_t by_route = plan.points / plan.inputs.size() / parts / kRoutePoints;
   const std::uint64_t by_memory =
       options.memory_bytes / 2 / parts / (kBlockPoints * plan.row().bytes());
   return static_cast<std::size_t>(

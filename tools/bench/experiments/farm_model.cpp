@@ -169,7 +169,7 @@ FarmTimes play(const FarmLoad& load, const TaskCosts& costs, const FarmHardware&
       {.tasks = load.parts,
        .cpu_seconds = start + points / parts * costs.part_seconds,
        .bytes = plan + points / parts * (costs.row_bytes + costs.stored_bytes) + costs.edge_bytes,
-       .opened = 4 + 4 * routes});  // the mark of each, its table, its points twice
+       .opened = 4 + 3 * routes});  // the mark of each, its table, its points of one range
   add(times.join, {.cpu_seconds = start + parts * costs.join_seconds,
                    .bytes = plan + parts * costs.edge_bytes,
                    .opened = 4 + 2 * parts + routes});  // and it removes the files of the routes
