@@ -69,6 +69,7 @@ class Runner {
       progress_.advance(1);
     }
     while (start_ready() || !running_.empty()) await_one();
+    if (result_.failed.empty()) remove_spent(plan_);
     progress_.end();
     return std::move(result_);
   }

@@ -207,7 +207,7 @@ void declare_pictures(CLI::App& app, std::string& pictures) {
                  "OPTIONS is one text, quoted as a shell has it, such as \"-o turn.##.exr "
                  "--turntable 48 --size 960x540\". Each frame is a task of its own. The scene and "
                  "the resources are those of the plan. For each bounce but the last, tasks light "
-                 "all parts once more, unless --shade has other bounces.")
+                 "all parts once more, unless --shade lights them with other settings.")
       ->type_name("OPTIONS")
       ->group("Pictures");
 }

@@ -195,6 +195,7 @@ std::vector<std::string> submit_to_slurm(const FarmPlan& plan, unsigned cores) {
     if (undone(task)) forget_failure(plan, task);
   }
   note_begin(plan);
+  if (all.empty()) remove_spent(plan);
   return all;
 }
 

@@ -269,6 +269,20 @@ class Farm(ProgramTest):
                 self.succeed(run_line["command"], *words)
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(self.scene))
 
+    def test_the_reference_of_open_job_description_takes_the_template(self):
+        python = os.environ.get("PTC_OPENJD_PYTHON", sys.executable)
+        if subprocess.run([python, "-c", "import openjd.model"], capture_output=True).returncode != 0:
+            self.skipTest("Open Job Description is not installed: pip install openjd-model, and name the Python in PTC_OPENJD_PYTHON")
+        self.plan("--city", "20k", "--sun", "200,35", "--shade", self.here / "lit.ply", "--bounces", 3, "--error", "10%", "--render",
+                  f"-o {self.here}/turn.#.exr --turntable 3 --bounces 2", parts=2)
+        read = ("import json, sys; from openjd import model\n"
+                "template = model.decode_job_template(template=json.load(open(sys.argv[1])))\n"
+                "job = model.create_job(job_template=template, job_parameter_values={})\n"
+                "for step in job.steps: print(step.name, len(list(model.StepParameterSpaceIterator(space=step.parameterSpace))))")
+        said = subprocess.run([python, "-c", read, self.export("openjd", "job.json")], capture_output=True, text=True)
+        self.assertEqual(said.stdout.split(), "route 1 part 2 join 1 light 2 join_light 1 bounce_1 2 join_bounce_1 1 bounce_2 2 "
+                         "join_bounce_2 1 tune 1 shade 1 collect 1 frame 3".split(), said.stderr)
+
     def test_an_export_does_not_replace_its_plan(self):
         self.plan(self.cloud, parts=1)
         for output, said in (("farm.json", "is the plan itself"), ("farm.txt", "must end in")):
@@ -822,9 +836,10 @@ class Farm(ProgramTest):
         # The last one removes them; so does one that is done, when the one that did it was killed before
         self.succeed(*plan["tasks"][-1]["command"])
         self.assertEqual(bounces(), [])
-        (self.here / "farm.parts" / "bounce_1.ptcx").write_bytes(b"")
-        self.succeed(*plan["tasks"][-1]["command"])
-        self.assertEqual(bounces(), [])
+        for command in (plan["tasks"][-1]["command"], ["ptcfarm", "run", "farm.json"]):
+            (self.here / "farm.parts" / "bounce_1.ptcx").write_bytes(b"")
+            self.succeed(*command)
+            self.assertEqual(bounces(), [])
         plan["frames"]["bounces"] = 2
         plan["tasks"] = [task for task in plan["tasks"] if task["wave"] != 2]
         (self.here / "farm.json").write_text(json.dumps(plan))

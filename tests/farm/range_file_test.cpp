@@ -7,6 +7,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
@@ -61,10 +62,10 @@ void write(const std::filesystem::path& path, const Points& points,
 
 /// The blocks of some ranges of a file, and their reader.
 struct Ranges {
-  std::vector<RangeBlock> blocks;
+  RangeBlocks ranges;
   RangeReader reader;
   Ranges(const std::filesystem::path& path, std::size_t first, std::size_t end)
-      : blocks(read_ranges(path, kPlan, kRow, first, end)), reader(path, kRow, blocks) {}
+      : ranges(read_ranges(path, kPlan, kRow, first, end)), reader(path, kRow, ranges.blocks) {}
   Ranges(const std::filesystem::path& path, std::size_t range) : Ranges(path, range, range + 1) {}
 };
 
@@ -225,21 +226,24 @@ TEST_CASE("range file: blocks behind the end, with checksums that fit, are refus
   write(path, points, cuts_of(points, 3));
   const std::vector<char> whole = bytes_of(path);
   // The end has the plan, the places of rows and index, the ranges and the checksum of these; a row
-  // has offset, points, checksum and three digests; the index has first row and checksum of a range
+  // has offset, points and checksum of a block; an entry has first row, checksum and three digests
   const auto bytes = std::as_bytes(std::span(whole));
   const std::size_t end = bytes.size() - 40;
   const auto rows = load<std::uint64_t>(bytes.data(), end + 8),
              index = load<std::uint64_t>(bytes.data(), end + 16),
-             count = load<std::uint64_t>(bytes.data(), index + 16);
+             count = load<std::uint64_t>(bytes.data(), index + 64);
   const auto refused = [&](std::size_t field, std::uint64_t value, const std::string& why) {
     CAPTURE(field, value);
     std::vector<std::byte> changed(bytes.begin(), bytes.end());
     store(changed.data(), field, value);
+    const auto all = std::span(std::as_const(changed));
     const std::array<std::uint64_t, 3> whose{kPlan, 0, 0};
-    store(changed.data(), index + 8,
-          xxh3_64(std::span(changed).subspan(rows, count * 72),
-                  xxh3_64(std::as_bytes(std::span(whose)))));
-    store(changed.data(), end + 32, xxh3_64(std::span(changed).subspan(end, 32)));
+    Xxh3 own(0);
+    own.add(std::as_bytes(std::span(whose)));
+    own.add(all.subspan(index + 16, 48));
+    own.add(all.subspan(rows, count * 24));
+    store(changed.data(), index + 8, own.value());
+    store(changed.data(), end + 32, xxh3_64(all.subspan(end, 32)));
     OutputFile file(path);
     file.append(changed);
     file.publish();
@@ -251,7 +255,7 @@ TEST_CASE("range file: blocks behind the end, with checksums that fit, are refus
   }
   refused(index, count + 1, "the index of the file is damaged");
   refused(index, 1000, "out of range");
-  refused(index + 16, count - 1, "the table of the file is damaged");
+  refused(index + 64, count - 1, "the table of the file is damaged");
   for (const std::uint64_t value : {index + 1, ~std::uint64_t{0}}) {
     refused(end + 8, value, "the end of the file is damaged");   // place of the rows
     refused(end + 24, value, "the end of the file is damaged");  // number of ranges

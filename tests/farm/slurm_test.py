@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -108,6 +109,24 @@ class Slurm(unittest.TestCase):
         self.assertEqual(shaded[0].read_bytes(), shaded[1].read_bytes())
         self.assertEqual([name for name in os.listdir(self.here / "farm.parts") if ".tmp-" in name], [])
         self.assertIn("all tasks are done", self.call("ptcfarm", "submit", self.plan, "--slurm"))
+
+    def test_lit_scenes_are_shaded_and_rendered_by_a_cluster(self):
+        coarse = ["--bounces", 2, "--solid-angle", 0.2, "--resolution", 16, "--parallax", 0.3]
+        options = ["--turntable", 2, "--size", "32x24", "--samples", 1, *coarse]
+        pictures = [shlex.quote(str(self.here / "turn.#.exr")), *map(str, options)]
+        self.call("ptcfarm", "plan", "--city", "20k", "--parts", 2, "--task-memory", "256M", "--sun", "200,35", *coarse,
+                  "--shade", self.here / "lit.ply", "--render", " ".join(["-o", *pictures]), "-o", self.plan)
+        tasks = json.loads(self.plan.read_text())["tasks"]
+        self.assertEqual({task["kind"] for task in tasks}, {"route", "part", "join", "light", "join_light", "bounce", "join_bounce",
+                                                            "shade", "collect", "frame"})
+        self.call("ptcfarm", "submit", self.plan, "--slurm")
+        self.wait_for("the end", lambda status: status["done"] == len(tasks), 120)
+        self.call("ptcshade", self.here / "farm.ptcx", *coarse, "-o", self.here / "one.ply")
+        self.call("ptcrender", self.here / "farm.ptcx", *options, "-o", self.here / "one.#.exr")
+        for name in ("lit.ply", "turn.1.exr", "turn.2.exr"):
+            one = re.sub(r"lit|turn", "one", name)
+            self.assertTrue((self.here / name).read_bytes() == (self.here / one).read_bytes(), name)
+        self.assertEqual([name for name in os.listdir(self.here / "farm.parts") if name.startswith(("bounce", "unlit", "route"))], [])
 
     def test_failed_tasks_are_shown_with_what_they_said_and_submitted_again(self):
         cloud = self.here / "c.ptcx"

@@ -35,11 +35,19 @@ constexpr std::uint64_t kAll = std::numeric_limits<std::uint64_t>::max();
 constexpr char kCapOfRun[] = "run.memory_bytes", kCapOfPlan[] = "task_memory";
 
 /// Returns the bytes that a route has for its ranges.
-/// @param field  as for MemoryBudget
-std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t cap, const char* field) {
+/// @param points  of its input
+/// @param field   as for MemoryBudget
+std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t points, std::uint64_t cap,
+                           const char* field) {
   MemoryBudget budget(cap, "a route of this plan", field);
   budget.charge("buffers", kBufferBytes);
-  return budget.rest("the ranges", RangeWriter::least_memory(plan.borders.size() + 1, plan.row()));
+  const std::size_t ranges = plan.borders.size() + 1;
+  const std::uint64_t least = RangeWriter::least_memory(ranges, plan.row());
+  // A half of what is left gives blocks of this size at least, and so this many
+  const std::uint64_t block = std::max<std::uint64_t>(
+      RangeWriter::block_points(ranges, plan.row(), std::max(budget.left() / 2, least)), 1);
+  budget.charge("the table of a route", RangeWriter::kTableBytes * (points / block + ranges));
+  return budget.rest("the ranges", least);
 }
 
 /// Returns the bytes that a part has for its sorts.
@@ -64,7 +72,7 @@ class Route {
         attributes_(plan.attributes()),
         values_(attributes_.groups()),
         writer_(task.outputs.at(0), plan.id, plan.borders, plan.row(),
-                ranges_bytes(plan, run.memory_bytes, kCapOfRun)) {}
+                ranges_bytes(plan, plan.inputs[task.number].points, run.memory_bytes, kCapOfRun)) {}
 
   void run() {
     const FarmInput& input = plan_.inputs[number_];
@@ -225,14 +233,12 @@ class Part {
   [[nodiscard]] std::uint64_t find() {
     std::uint64_t points = 0;
     for (std::size_t i = 0; i < plan_.inputs.size(); ++i) {
-      Routed route{.path = plan_.output({TaskKind::route}, i), .blocks = {}};
-      route.blocks = read_ranges(route.path, plan_.id, row_, first_, end_);
-      for (const RangeBlock& block : route.blocks) {
-        points += block.points;
-        for (std::size_t set = 0; set < digests_.size(); ++set)
-          digests_[set] = sum(digests_[set], block.digests[set]);
-      }
-      if (!route.blocks.empty()) routes_.push_back(std::move(route));
+      const std::filesystem::path path = plan_.output({TaskKind::route}, i);
+      RangeBlocks own = read_ranges(path, plan_.id, row_, first_, end_);
+      for (const RangeBlock& block : own.blocks) points += block.points;
+      for (std::size_t set = 0; set < digests_.size(); ++set)
+        digests_[set] = sum(digests_[set], own.digests[set]);
+      if (!own.blocks.empty()) routes_.push_back({path, std::move(own.blocks)});
     }
     return points;
   }
@@ -351,7 +357,9 @@ class Part {
 }  // namespace
 
 void require_task_memory(const FarmPlan& plan, std::uint64_t memory_bytes) {
-  static_cast<void>(ranges_bytes(plan, memory_bytes, kCapOfPlan));
+  std::uint64_t most = 0;
+  for (const FarmInput& input : plan.inputs) most = std::max(most, input.points);
+  static_cast<void>(ranges_bytes(plan, most, memory_bytes, kCapOfPlan));
   static_cast<void>(sorts_bytes(plan, memory_bytes, 1, kCapOfPlan));
 }
 

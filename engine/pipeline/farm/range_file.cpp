@@ -24,7 +24,7 @@ constexpr std::size_t kMinBlock = 64, kMaxBlock = std::size_t{1} << 14;  // poin
 constexpr std::size_t kMoreBlocks = 3;
 // The plan, the place of the rows and of the index, the number of ranges, the checksum of these.
 constexpr std::size_t kEndBytes = 5 * sizeof(std::uint64_t);
-constexpr std::size_t kIndexBytes = 2 * sizeof(std::uint64_t);  // of a range: first row, checksum
+constexpr std::size_t kRowBytes = 3 * sizeof(std::uint64_t);  // of the table
 
 /// Takes the values of points apart from the bytes of a group: records with the points' keys.
 void unpack_values(std::span<const PointRecord> points, const std::byte* from, std::size_t bytes,
@@ -36,16 +36,20 @@ void unpack_values(std::span<const PointRecord> points, const std::byte* from, s
   }
 }
 
-/// Returns the bytes of a row of the table.
-std::size_t row_bytes(const RangeRow& row) {
-  return 3 * sizeof(std::uint64_t) + (1 + row.group_bytes.size()) * sizeof(RecordsDigest);
+/// Returns the bytes of an entry of the index.
+std::size_t entry_bytes(const RangeRow& row) {
+  return 2 * sizeof(std::uint64_t) + (1 + row.group_bytes.size()) * sizeof(RecordsDigest);
 }
 
-/// Returns the checksum of the rows of a range.
+/// Returns the checksum of the rows of a range, and of what else its entry says.
 std::uint64_t checksum_of(std::span<const std::byte> rows, std::uint64_t plan, std::size_t range,
-                          std::uint64_t first_row) {
+                          std::uint64_t first_row, std::span<const RecordsDigest> digests) {
   const std::array<std::uint64_t, 3> whose{plan, range, first_row};
-  return xxh3_64(rows, xxh3_64(std::as_bytes(std::span(whose))));
+  Xxh3 hash(0);
+  hash.add(std::as_bytes(std::span(whose)));
+  hash.add(std::as_bytes(digests));
+  hash.add(rows);
+  return hash.value();
 }
 
 /// Says whether a container may hold a point.
@@ -57,6 +61,12 @@ bool fits_container(const PointRecord& point) noexcept {
 
 std::size_t RangeRow::bytes() const noexcept {
   return std::accumulate(group_bytes.begin(), group_bytes.end(), sizeof(PointRecord));
+}
+
+std::size_t RangeWriter::block_points(std::size_t ranges, const RangeRow& row,
+                                      std::uint64_t memory_bytes) {
+  const std::uint64_t points = memory_bytes / ((ranges + kMoreBlocks) * row.bytes());
+  return static_cast<std::size_t>(std::min<std::uint64_t>(points, kMaxBlock));
 }
 
 std::uint64_t RangeWriter::least_memory(std::size_t ranges, const RangeRow& row) {
@@ -75,8 +85,8 @@ RangeWriter::RangeWriter(const std::filesystem::path& target, std::uint64_t plan
       open_(cuts.size() + 1) {
   if (memory_bytes < least_memory(open_.size(), row_))
     throw std::invalid_argument("RangeWriter: too little memory");
-  const std::uint64_t points = memory_bytes / ((open_.size() + kMoreBlocks) * row_.bytes());
-  block_points_ = static_cast<std::size_t>(std::min<std::uint64_t>(points, kMaxBlock));
+  block_points_ = block_points(open_.size(), row_, memory_bytes);
+  for (Open& open : open_) open.digests.resize(1 + row_.group_bytes.size());
   for (Arena& arena : packed_) arena = Arena(direct_blocks(block_points_ * row_.bytes()));
 }
 
@@ -113,19 +123,19 @@ void RangeWriter::flush(std::size_t range) {
   const std::size_t count = open.points.size();
   if (count == 0) return;
   const std::span<std::byte> bytes(packed_[turn_].data(), count * row_.bytes());
-  std::vector<RecordsDigest> digests{digest_of(open.points)};
+  open.digests[0] = sum(open.digests[0], digest_of(open.points));
   std::memcpy(bytes.data(), open.points.data(), count * sizeof(PointRecord));
   std::byte* to = bytes.data() + count * sizeof(PointRecord);
   const std::byte* from = open.values.data();
-  for (const std::size_t size : row_.group_bytes) {
+  for (std::size_t group = 0; group < row_.group_bytes.size(); ++group) {
+    const std::size_t size = row_.group_bytes[group];
     std::memcpy(to, from, count * size);
     unpack_values(open.points, from, size, unpacked_);
-    digests.push_back(digest_of(unpacked_));
+    open.digests[group + 1] = sum(open.digests[group + 1], digest_of(unpacked_));
     to += count * size;
     from += block_points_ * size;
   }
-  blocks_.push_back(
-      {static_cast<std::uint32_t>(range), end_, count, xxh3_64(bytes), std::move(digests)});
+  blocks_.push_back({static_cast<std::uint32_t>(range), end_, count, xxh3_64(bytes)});
   open.points.clear();
   write({bytes.data(), direct_blocks(bytes.size())});
   turn_ = 1 - turn_;
@@ -144,26 +154,30 @@ void RangeWriter::write_table() {
   StateWriter index;
   std::vector<std::byte> bytes;
   std::uint64_t rows = 0;
+  const auto put_entry = [&](std::uint64_t xxh3, std::span<const RecordsDigest> digests) {
+    index.put(rows);
+    index.put(xxh3);
+    for (const RecordsDigest& digest : digests) {
+      index.put(digest[0]);
+      index.put(digest[1]);
+    }
+  };
   auto block = blocks_.begin();
   for (std::size_t range = 0; range < open_.size(); ++range) {
-    const std::uint64_t first = rows;
     StateWriter own;
-    for (; block != blocks_.end() && block->range == range; ++block, ++rows) {
+    std::uint64_t count = 0;
+    for (; block != blocks_.end() && block->range == range; ++block, ++count) {
       own.put(block->offset);
       own.put(block->points);
       own.put(block->xxh3);
-      for (const RecordsDigest& digest : block->digests) {
-        own.put(digest[0]);
-        own.put(digest[1]);
-      }
     }
-    const std::vector<std::byte> row_bytes = own.take();
-    index.put(first);
-    index.put(checksum_of(row_bytes, plan_, range, first));
-    bytes.insert(bytes.end(), row_bytes.begin(), row_bytes.end());
+    const std::vector<std::byte> of_range = own.take();
+    const std::vector<RecordsDigest>& digests = open_[range].digests;
+    put_entry(checksum_of(of_range, plan_, range, rows, digests), digests);
+    bytes.insert(bytes.end(), of_range.begin(), of_range.end());
+    rows += count;
   }
-  index.put(rows);
-  index.put(std::uint64_t{0});
+  put_entry(0, std::vector<RecordsDigest>(1 + row_.group_bytes.size()));
 
   // Write them, and behind them where they are
   StateWriter end;
@@ -185,15 +199,19 @@ void RangeWriter::write_table() {
 }
 
 void RangeWriter::finish() {
-  for (std::size_t range = 0; range < open_.size(); ++range) flush(range);
+  for (std::size_t range = 0; range < open_.size(); ++range) {
+    flush(range);
+    open_[range].points = {};
+    open_[range].values = {};
+  }
   write_table();
   file_.sync();
   std::filesystem::rename(partial_, target_);
   sync_directory(target_);
 }
 
-std::vector<RangeBlock> read_ranges(const std::filesystem::path& path, std::uint64_t plan,
-                                    const RangeRow& row, std::size_t first, std::size_t end) {
+RangeBlocks read_ranges(const std::filesystem::path& path, std::uint64_t plan, const RangeRow& row,
+                        std::size_t first, std::size_t end) {
   const std::string name = path.string();
   const auto require = [&](bool holds, const char* what) {
     if (!holds) throw DataError(name + ": " + what);
@@ -213,47 +231,51 @@ std::vector<RangeBlock> read_ranges(const std::filesystem::path& path, std::uint
              index_at = places.get<std::uint64_t>(), ranges = places.get<std::uint64_t>();
   require(places.get<std::uint64_t>() == xxh3_64(std::span(last).first(kEndBytes - 8)) &&
               rows_at <= index_at && index_at <= end_at &&
-              ranges < (end_at - index_at) / kIndexBytes,
+              ranges < (end_at - index_at) / entry_bytes(row),
           "the end of the file is damaged");
   require(own_plan == plan, "the file is of another plan");
   require(first <= end && end <= ranges, "the file has fewer ranges");
 
-  // Read the index of the ranges
-  const std::uint64_t most = (index_at - rows_at) / row_bytes(row);
-  const std::uint64_t own_at = index_at + first * kIndexBytes;
-  const std::vector<std::byte> index = read(own_at, (end - first + 1) * kIndexBytes);
+  // Read the entries of the ranges
+  const std::uint64_t most = (index_at - rows_at) / kRowBytes;
+  const std::uint64_t own_at = index_at + first * entry_bytes(row);
+  const std::vector<std::byte> index = read(own_at, (end - first + 1) * entry_bytes(row));
   StateReader entries(index, name, own_at);
   std::vector<std::uint64_t> begin, xxh3;
+  std::vector<std::vector<RecordsDigest>> digests;
   for (std::size_t i = first; i <= end; ++i) {
     begin.push_back(entries.get_count(most));
     xxh3.push_back(entries.get<std::uint64_t>());
+    digests.emplace_back();
+    for (std::size_t set = 0; set <= row.group_bytes.size(); ++set) {
+      const auto low = entries.get<std::uint64_t>();
+      digests.back().push_back({low, entries.get<std::uint64_t>()});
+    }
   }
   require(std::ranges::is_sorted(begin), "the index of the file is damaged");
 
   // Read their rows
-  const std::uint64_t offset = rows_at + begin.front() * row_bytes(row);
-  const std::vector<std::byte> bytes =
-      read(offset, (begin.back() - begin.front()) * row_bytes(row));
+  const std::uint64_t offset = rows_at + begin.front() * kRowBytes;
+  const std::vector<std::byte> bytes = read(offset, (begin.back() - begin.front()) * kRowBytes);
   StateReader rows(bytes, name, offset);
-  std::vector<RangeBlock> blocks;
+  RangeBlocks found;
+  found.digests.resize(1 + row.group_bytes.size());
   for (std::size_t i = 0; i < end - first; ++i) {
-    const auto own = std::span(bytes).subspan((begin[i] - begin.front()) * row_bytes(row),
-                                              (begin[i + 1] - begin[i]) * row_bytes(row));
-    require(checksum_of(own, plan, first + i, begin[i]) == xxh3[i],
+    const auto own = std::span(bytes).subspan((begin[i] - begin.front()) * kRowBytes,
+                                              (begin[i + 1] - begin[i]) * kRowBytes);
+    require(checksum_of(own, plan, first + i, begin[i], digests[i]) == xxh3[i],
             "the table of the file is damaged");
+    for (std::size_t set = 0; set < found.digests.size(); ++set)
+      found.digests[set] = sum(found.digests[set], digests[i][set]);
     for (std::uint64_t at = begin[i]; at < begin[i + 1]; ++at) {
       RangeBlock block{.range = static_cast<std::uint32_t>(first + i)};
       block.offset = rows.get_count(rows_at);
       block.points = rows.get_count((rows_at - block.offset) / row.bytes());
       block.xxh3 = rows.get<std::uint64_t>();
-      for (std::size_t set = 0; set <= row.group_bytes.size(); ++set) {
-        const auto low = rows.get<std::uint64_t>();
-        block.digests.push_back({low, rows.get<std::uint64_t>()});
-      }
-      blocks.push_back(std::move(block));
+      found.blocks.push_back(block);
     }
   }
-  return blocks;
+  return found;
 }
 
 RangeReader::RangeReader(const std::filesystem::path& path, RangeRow row,

@@ -1,10 +1,10 @@
 // The points that a task of a farm has sorted into ranges of the curve, in one file.
 //
-//   block | block | ... | rows of range 0, of range 1, ... | index: rows and checksum of each range
-//   | end
+//   block | block | ... | rows of range 0, of range 1, ... | index: an entry for each range | end
 //
-// A row has offset, points, checksum and digests of a block. Who wants some ranges reads their part
-// of the index, their rows and their blocks, however many others there are.
+// A row has offset, points and checksum of a block. An entry has the first row of a range, the
+// checksum of its rows, and the digests of its points. Who wants some ranges reads their entries,
+// their rows and their blocks, however many others there are.
 //
 // Blocks begin at multiples of kDirectBytes and pass by the page cache: they are read once, by
 // other machines. A file system that has no direct transfers gets usual ones.
@@ -42,12 +42,17 @@ struct RangeBlock {
   std::uint64_t offset = 0;  ///< bytes from the start of the file
   std::uint64_t points = 0;
   std::uint64_t xxh3 = 0;  ///< of its bytes
-  /// Of its records, and of the values of each group with the keys of their points.
+};
+
+/// The blocks of some ranges.
+struct RangeBlocks {
+  std::vector<RangeBlock> blocks;  ///< range by range, in the order of the file
+  /// Of all their records, and of the values of each group with the keys of their points.
   std::vector<RecordsDigest> digests;
 };
 
 /// Writes the points of an input by range.
-/// Memory: `memory_bytes`.
+/// Memory: `memory_bytes`, and kTableBytes for each block; block_points() says how large these are.
 class RangeWriter {
  public:
   /// @param target  appears whole, when finish() is called
@@ -63,13 +68,19 @@ class RangeWriter {
   /// Writes what is left and publishes the file.
   void finish();
 
+  /// The memory of a block in the table, bytes, with what its vector grows ahead.
+  static constexpr std::uint64_t kTableBytes = 2 * sizeof(RangeBlock);
+  /// Returns the number of points in a full block.
+  [[nodiscard]] static std::size_t block_points(std::size_t ranges, const RangeRow& row,
+                                                std::uint64_t memory_bytes);
   /// The least memory that a number of ranges needs, bytes.
   [[nodiscard]] static std::uint64_t least_memory(std::size_t ranges, const RangeRow& row);
 
  private:
   struct Open {
     std::vector<PointRecord> points;
-    std::vector<std::byte> values;  ///< group after group, each with room for a whole block
+    std::vector<std::byte> values;       ///< group after group, each with room for a whole block
+    std::vector<RecordsDigest> digests;  ///< of the blocks that were written, as of RangeBlocks
   };
 
   [[nodiscard]] std::size_t range_of(const MortonKey& key) const;
@@ -94,12 +105,11 @@ class RangeWriter {
   std::future<void> writing_;  ///< last, so that its end is awaited before the other members go
 };
 
-/// Returns the blocks of some ranges: range by range, in the order of the file.
+/// Returns the blocks of some ranges.
 /// @param first, end  numbers of the first range, and of the one behind the last
 /// @throws DataError when the file is damaged or of another plan; std::system_error
-[[nodiscard]] std::vector<RangeBlock> read_ranges(const std::filesystem::path& path,
-                                                  std::uint64_t plan, const RangeRow& row,
-                                                  std::size_t first, std::size_t end);
+[[nodiscard]] RangeBlocks read_ranges(const std::filesystem::path& path, std::uint64_t plan,
+                                      const RangeRow& row, std::size_t first, std::size_t end);
 
 /// Reads the points of some blocks.
 class RangeReader {

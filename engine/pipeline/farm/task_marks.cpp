@@ -116,7 +116,7 @@ std::vector<TaskKind> last_users(const FarmPlan& plan, const FarmTask& task) {
       return {TaskKind::collect};
     case TaskKind::bounce:
     case TaskKind::join_bounce:
-      if (plan.shading) users.push_back(TaskKind::collect);
+      if (plan.shading && plan.shading->request.bounces > 1) users.push_back(TaskKind::collect);
       if (plan.renders_bounces()) users.push_back(TaskKind::frame);
       break;
     case TaskKind::light:
@@ -136,8 +136,10 @@ bool TaskMarks::is_spent(const FarmTask& task) {
 
 bool TaskMarks::all_done(TaskKind kind) {
   if (const auto found = all_done_.find(kind); found != all_done_.end()) return found->second;
-  const bool all = std::ranges::all_of(
-      plan_.tasks, [&](const FarmTask& task) { return task.step.kind != kind || is_done(task); });
+  // Tasks run in this order about, so that the last one tells soonest that not all are done
+  const bool all = std::all_of(plan_.tasks.rbegin(), plan_.tasks.rend(), [&](const FarmTask& task) {
+    return task.step.kind != kind || is_done(task);
+  });
   return all_done_[kind] = all;
 }
 

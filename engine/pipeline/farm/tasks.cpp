@@ -72,14 +72,7 @@ void remove_leftovers(const FarmPlan& plan, const FarmTask& task) {
   TaskMarks marks(plan);
   // A second process of a task may come later than those who need its output
   if (marks.is_spent(task)) remove_output(task);
-  if (!may_spend(plan, task, marks)) return;
-  for (const FarmTask& other : plan.tasks) {
-    if (marks.is_spent(other)) remove_output(other);
-  }
-  std::error_code gone;
-  for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
-    if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
-  }
+  if (may_spend(plan, task, marks)) remove_spent(plan);
 }
 
 /// Joins the parts that have points.
@@ -241,13 +234,25 @@ void require_forerunners(const FarmPlan& plan, const FarmTask& task, TaskMarks& 
 
 }  // namespace
 
+void remove_spent(const FarmPlan& plan) {
+  TaskMarks marks(plan);
+  for (const FarmTask& task : plan.tasks) {
+    if (marks.is_spent(task)) remove_output(task);
+  }
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator(plan.folder())) {
+    if (is_leftover(entry.path())) std::filesystem::remove(entry.path(), gone);
+  }
+}
+
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress,
               const RenderFrame& frame) {
   bool performed = false;
   try {
     TaskMarks marks(plan);
     if (marks.is_done(task)) {
-      remove_leftovers(plan, task);  // of one that was killed before it could
+      const bool is_last = task.step.kind == TaskKind::collect || task.step.kind == TaskKind::frame;
+      if (is_last) remove_leftovers(plan, task);  // one that was killed could not
       return false;
     }
     require_forerunners(plan, task, marks);

@@ -27,4 +27,8 @@ using RenderFrame = std::function<void(const FarmTask& task)>;
 bool run_task(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Progress& progress,
               const RenderFrame& frame = {});
 
+/// Removes what tasks wrote that no other one needs any more, and temporary files that killed tasks
+/// have left. Tasks do so themselves, unless they are killed before.
+void remove_spent(const FarmPlan& plan);
+
 }  // namespace ptc
