@@ -154,6 +154,19 @@ class Slurm(unittest.TestCase):
         self.assertEqual(tries.read_text(), "x\nx\n")
         self.assertIn("no room", (self.here / "farm.parts" / "log" / "part_0.0").read_text())
 
+    def test_a_task_that_is_preempted_is_queued_again(self):
+        """Slurm ends a preempted job and queues it again as scontrol does here."""
+        self.call("ptcfarm", "plan", "--city", "8k", "--parts", 1, "--task-memory", "256M", "-o", self.plan)
+        begun = self.here / "begun"
+        self.use(f'#!/bin/sh\nif [ "$1" = part ]; then echo x >>"{begun}"; [ $(wc -l <"{begun}") -gt 1 ] || sleep 60; fi\n'
+                 f'exec {BIN}/ptcfarm "$@"\n')
+        jobs = self.facts("ptcfarm", "submit", self.plan, "--slurm")["jobs"]
+        self.cluster.wait("a part that runs", begun.exists)
+        self.cluster.call("scontrol", "requeue", jobs[1] + "_0")
+        self.wait_for("the end", lambda status: status["done"] == 3)
+        self.assertEqual(begun.read_text(), "x\nx\n")
+        self.assertEqual(self.status()["failed"], 0)
+
     def test_a_job_that_takes_too_much_memory_is_shown_and_cancelled_jobs_are_gone(self):
         self.call("ptcfarm", "plan", "--city", "8k", "--parts", 3, "--task-memory", "256M", "-o", self.plan)
         big = "import time; x = bytearray(600 << 20); time.sleep(30)"

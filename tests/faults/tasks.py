@@ -1,7 +1,8 @@
 """The tasks of a farm under faults: a task that fails or is killed says so, leaves no half file under a final name, and the
 plan still comes to the bytes that it comes to without faults.
 
-    route.0 -> part.0, part.1 -> join -> shade.0 -> collect       a fault in one of them, then `ptcfarm run`
+    route.0 -> part.0, part.1 -> join -> light.0, light.1 -> join_light -> bounce_1.0, bounce_1.1 -> join_bounce_1
+            -> shade.0 -> collect -> frame.0, frame.1                    a fault in one of them, then `ptcfarm run`
 """
 
 import json
@@ -15,6 +16,9 @@ from pathlib import Path
 
 from harness import BIN, HARMLESS, SECONDS, TEMPORARY, Run, environment, text_of
 
+# The marks of tasks of a plan that lights, where they have other names
+MARKS = {"part.0": "unlit.0", "join": "unlit", "light.0": "part.0", "join_light": "join"}
+COARSE = ["--solid-angle", "0.3", "--resolution", "16", "--parallax", "0.4", "--bounces", "2"]
 HOWS = {"eio": "Input/output error", "enospc": "No space left on device", "kill": "", "stale": ""}
 
 
@@ -28,8 +32,10 @@ class Farm:
         self.home.mkdir()
         self.states.mkdir()
         self.plan, self.marks = self.home / "city.json", "city.parts"
-        self.call("plan", "--city", "3k", "--parts", "2", "--shade", self.home / "lit.ply", "--bounces", "0",
-                  "--task-memory", "256M", "--page-size", "4K", "-o", self.plan)
+        pictures = ["-o", str(self.home / "turn.#.exr"), "--turntable", "2", "--size", "16x12", "--samples", "1", *COARSE]
+        planned = self.call("plan", "--city", "3k", "--parts", "2", "--sun", "200,35", "--shade", self.home / "lit.ply", *COARSE,
+                            "--render", " ".join(pictures), "--task-memory", "256M", "--page-size", "4K", "-o", self.plan)
+        assert planned.code == 0, planned.errors
         self.tasks = json.loads(self.plan.read_text())["tasks"]
         self.after = {}  # by task: the files when it has ended, and their bytes
         for task in self.tasks:
@@ -83,7 +89,7 @@ class Farm:
                 wrong.append(f"a half file: {place}")
         # A task may fail once its outputs are there and it is marked as done: then nothing is lost
         outputs = [str(Path(path).relative_to(self.home)) for path in task["outputs"]]
-        if f"{self.marks}/done/{name}" in now:
+        if f"{self.marks}/done/{MARKS.get(name, name)}" in now:
             if any(place not in now for place in outputs):
                 wrong.append("it is marked as done without its outputs")
         elif run.code == 0:
@@ -109,7 +115,8 @@ def fail_tasks(arguments, tally):
     with tempfile.TemporaryDirectory(prefix="ptc-faults-") as home:
         farm = Farm(home)
         for task in farm.tasks:
-            if task["name"] == "part.1":
+            kind = task["kind"]
+            if task["number"] == 1 and kind != "frame":  # the last picture removes the bounces
                 continue
             codes, runs = Counter(), 0
             for how in HOWS:
@@ -117,7 +124,8 @@ def fail_tasks(arguments, tally):
                 count = farm.run(task, how=how).calls
                 assert count > 0, f"{task['name']}: no call can be hit"
                 whole = arguments.all or (how, task["name"]) == ("stale", "join")  # where a part was lost once
-                chosen = arguments.steps(count, 10 ** 9 if whole else 4)
+                few = kind in ("light", "join_light", "bounce", "join_bounce", "frame")  # much is as in other kinds
+                chosen = arguments.steps(count, 10 ** 9 if whole else 1 if few else 4)
                 for at in chosen:
                     # Every second one goes on failing, as a full disk does
                     on = how not in ("kill", "stale") and random.Random(f"{task['name']} {how} {at}").random() < 0.5
