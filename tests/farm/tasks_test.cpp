@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -197,4 +198,74 @@ TEST_CASE("ranges: rays of a range are those of a whole run", "[farm][ranges]") 
   }
   collect_shading(request, results, 7, directory / "ranges.ply", silent);
   CHECK((test::bytes_of(directory / "ranges.ply") == test::bytes_of(directory / "whole.ply")));
+}
+
+TEST_CASE("task: whoever lights, adds bounces, shades or renders beside others ends well",
+          "[farm][tasks]") {
+  // A plan with each of these tasks; its pictures are copies of their bounces
+  const test::TemporaryDirectory directory;
+  Progress silent;
+  BuildRequest request;
+  request.city_points = 4'000;
+  LightRequest lighting;
+  lighting.lights = LightRig{.suns = {Sun{}}};
+  FarmShading shading{.target = directory / "tile.#.ply"};
+  shading.request.bounces = 2;
+  shading.request.gather.solid_angle = 0.3F;
+  FarmFrames frames{.directory = directory.path(),
+                    .targets = {directory / "turn.#.exr"},
+                    .range = FrameRange{1, 2, 1},
+                    .lighting = shading.request};
+  FarmOptions options{
+      .parts = 2, .lighting = lighting, .shading = shading, .frames = std::move(frames)};
+  options.command = [](const FarmPlan&, const FarmTask&) { return std::vector<std::string>(); };
+  FarmPlan plan =
+      make_plan(request, directory / "city.ptcx", directory / "city.json", options, silent);
+  write_plan(plan);
+  REQUIRE(plan.waves() == 1);
+  const auto run = [&](const FarmTask& task, Progress& progress,
+                       const std::function<void()>& before_frame = {}) {
+    return run_task(plan, task, {}, progress, [&](const FarmTask& frame) {
+      if (before_frame) before_frame();
+      std::filesystem::copy_file(plan.output({TaskKind::join_bounce, 1}, 0), frame.outputs.at(0),
+                                 std::filesystem::copy_options::overwrite_existing);
+    });
+  };
+  const auto finish = [&] {
+    for (const FarmTask& task : plan.tasks) run(task, silent);
+  };
+  const auto found = [&] {
+    std::map<std::string, std::vector<char>> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(directory.path())) {
+      const std::string name = entry.path().lexically_relative(directory.path());
+      if (entry.is_regular_file()) files[name] = test::bytes_of(entry.path());
+    }
+    return files;
+  };
+  finish();
+  const auto wanted = found();
+
+  // Another process does all of the plan in the middle of a task
+  for (const FarmTask& chosen : plan.tasks) {
+    const TaskKind kind = chosen.step.kind;
+    const bool frame = kind == TaskKind::frame;
+    if (kind != TaskKind::light && kind != TaskKind::bounce && kind != TaskKind::shade && !frame)
+      continue;
+    CAPTURE(chosen.name());
+    std::filesystem::remove_all(plan.folder());
+    std::filesystem::remove(plan.scene);
+    for (const FarmTask& task : plan.tasks) {
+      if (task.step == chosen.step) break;
+      run(task, silent);
+    }
+    bool called = false;
+    const auto others = [&] {
+      if (!std::exchange(called, true)) finish();
+    };
+    AtStage at_stage(frame ? "" : name_of(kind), others);
+    const bool ran = run(chosen, at_stage, frame ? others : std::function<void()>());
+    if (frame) CHECK_FALSE(ran);  // the others have removed its bounces
+    CHECK(called);
+    CHECK((found() == wanted));
+  }
 }
