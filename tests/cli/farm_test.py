@@ -98,6 +98,12 @@ class Farm(ProgramTest):
         self.succeed("ptcbuild", wide, "--profile", "exact", "-o", one)
         self.assertEqual(self.digest(self.here / "farm.ptcx"), self.digest(one))
 
+    def test_a_large_scene_has_no_more_routes_than_a_scheduler_starts_soon(self):
+        for points, least, most in (("100M", 24, 25), ("20G", 1990, 2010)):
+            plan = self.plan("--city", points, parts=20)
+            self.assertGreaterEqual(len(plan["inputs"]), least)
+            self.assertLessEqual(len(plan["inputs"]), most)
+
     def test_a_plan_of_one_part_and_a_plan_of_more_parts_than_there_are_cuts(self):
         for parts, cuts in ((1, 0), (500, 30)):
             self.assertGreaterEqual(len(self.plan(self.cloud, parts=parts)["cuts"]), cuts)

@@ -34,6 +34,8 @@ constexpr std::uint64_t kSortShare = 2;
 constexpr std::uint64_t kShadedPoints = 1'000'000;  // of a task
 constexpr double kMaxSeconds = 1e9;                 // of a task
 constexpr std::uint64_t kMaxShares = 10'000;        // of a file
+// Points that a task routes at least, where it may choose, and how many such tasks are enough.
+constexpr std::uint64_t kSharePoints = 4'000'000, kMostShares = 2'000;
 
 /// @param lit  the points are lit anew
 void check_inputs(const BuildInputs& inputs, bool lit) {
@@ -328,13 +330,17 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   if (inputs.bounds.empty()) throw DataError("the inputs have no points");
 
   // Write down what follows from them
+  plan.points = request.city_points + inputs.clouds.points;
+  const std::uint64_t share_points = options.share_points > 0
+                                         ? options.share_points
+                                         : std::max(kSharePoints, plan.points / kMostShares);
   for (const Clouds::Cloud& cloud : inputs.clouds.files) {
     if (cloud.place)
       throw RequestError("inputs",
                          "a farm builds clouds where they are: build scene files on one "
                          "machine");
     const std::filesystem::path path = std::filesystem::absolute(cloud.path);
-    const std::uint64_t shares = shares_of(cloud, request.selection, options.share_points);
+    const std::uint64_t shares = shares_of(cloud, request.selection, share_points);
     for (std::uint64_t i = 0; i < shares; ++i) {
       const std::uint64_t first = cloud.points * i / shares;
       plan.inputs.push_back({.path = path,
@@ -344,10 +350,9 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
                              .taken = cloud.taken});
     }
   }
-  if (request.city_points > 0) plan.inputs = city_shares(request.city_points, options.share_points);
+  if (request.city_points > 0) plan.inputs = city_shares(request.city_points, share_points);
   plan.frame = frame_around(to_array(inputs.bounds.low), to_array(inputs.bounds.high));
   plan.emits = inputs.clouds.emits;
-  plan.points = request.city_points + inputs.clouds.points;
   plan.meta = complete_record(make_meta(request, inputs), 0, nullptr, request.page_shift);
   check_meta(plan.meta, request.page_shift, plan.emits ? kEmittingPointBytes : kPointBytes);
 

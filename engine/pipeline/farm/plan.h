@@ -148,7 +148,9 @@ struct FarmOptions {
   TaskCommand command;
   std::size_t parts = 0;  ///< 0: as many as let the points of a part fit in memory
   std::uint64_t memory_bytes = std::uint64_t{1} << 30;  ///< the cap of each task
-  std::uint64_t share_points = 4'000'000;  ///< that a task routes, of a container or the city
+  /// Points of a container or the city that a task routes; 0: 4 million, or more where it would
+  /// take more than 2,000 tasks to route all.
+  std::uint64_t share_points = 0;
   std::size_t ranges = 0;  ///< of the curve in a part, at most; 0: as many as speed up its sort
   std::optional<LightRequest> lighting;  ///< as of FarmPlan
   std::optional<FarmShading> shading;
