@@ -329,8 +329,7 @@ void render_frame(const ptc::FarmPlan& plan, const ptc::FarmTask& task, const pt
   if (plan.renders_bounces()) {
     if (!ptc::has_same_bounces(pictures->arguments.lighting(pictures->command), frames.lighting))
       throw ptc::DataError(plan.file.string() + ": its pictures have other bounces than it says");
-    const unsigned wave = frames.lighting.bounces - 1;
-    pictures->arguments.use_bounces(plan.output({ptc::TaskKind::join_bounce, wave}, 0));
+    pictures->arguments.use_bounces(plan.bounced(frames.lighting.bounces));
   }
   static_cast<void>(pictures->arguments.render(pictures->command, own, progress));
 }

@@ -42,10 +42,11 @@ std::uint64_t ranges_bytes(const FarmPlan& plan, std::uint64_t points, std::uint
   MemoryBudget budget(cap, "a route of this plan", field);
   budget.charge("buffers", kBufferBytes);
   const std::size_t ranges = plan.borders.size() + 1;
-  const std::uint64_t least = RangeWriter::least_memory(ranges, plan.row());
+  const RangeRow row = plan.row();
+  const std::uint64_t least = RangeWriter::least_memory(ranges, row);
   // A half of what is left gives blocks of this size at least, and so this many
   const std::uint64_t block = std::max<std::uint64_t>(
-      RangeWriter::block_points(ranges, plan.row(), std::max(budget.left() / 2, least)), 1);
+      RangeWriter::block_points(ranges, row, std::max(budget.left() / 2, least)), 1);
   budget.charge("the table of a route", RangeWriter::kTableBytes * (points / block + ranges));
   return budget.rest("the ranges", least);
 }

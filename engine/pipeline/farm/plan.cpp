@@ -35,7 +35,7 @@ constexpr std::uint64_t kShadedPoints = 1'000'000;  // of a task
 constexpr double kMaxSeconds = 1e9;                 // of a task
 constexpr std::uint64_t kMaxShares = 10'000;        // of a file
 // Points that a task routes at least, where it may choose, and how many such tasks are enough.
-constexpr std::uint64_t kSharePoints = 4'000'000, kMostShares = 2'000;
+constexpr std::uint64_t kSharePoints = 4'000'000, kEnoughRoutes = 2'000;
 
 /// @param lit  the points are lit anew
 void check_inputs(const BuildInputs& inputs, bool lit) {
@@ -333,7 +333,7 @@ FarmPlan make_plan(const BuildRequest& request, const std::filesystem::path& sce
   plan.points = request.city_points + inputs.clouds.points;
   const std::uint64_t share_points = options.share_points > 0
                                          ? options.share_points
-                                         : std::max(kSharePoints, plan.points / kMostShares);
+                                         : std::max(kSharePoints, plan.points / kEnoughRoutes);
   for (const Clouds::Cloud& cloud : inputs.clouds.files) {
     if (cloud.place)
       throw RequestError("inputs",

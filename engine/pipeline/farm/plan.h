@@ -201,6 +201,10 @@ struct FarmPlan {
   [[nodiscard]] bool renders_bounces() const noexcept;
   /// Returns the settings of the bounces that tasks make. @pre waves() > 0
   [[nodiscard]] const LightingRequest& bounce_settings() const noexcept;
+  /// Returns the scene of the plan with the light of all bounces but the last, which tasks have
+  /// made.
+  /// @param bounces  2 to waves() + 1
+  [[nodiscard]] std::filesystem::path bounced(unsigned bounces) const;
   /// Returns the files of a picture. @pre frames
   [[nodiscard]] std::vector<std::filesystem::path> pictures(std::size_t number) const;
   /// Returns the first file that a task writes.

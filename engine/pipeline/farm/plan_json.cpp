@@ -150,7 +150,7 @@ LightRequest lighting_of(const OrderedJson& json) {
   return lighting;
 }
 
-/// Adds the settings of a gather, and the lift of its receivers.
+/// Adds the number of bounces, the settings of the gather, and the lift of its receivers.
 void put_gather(OrderedJson& json, const LightingRequest& request) {
   const GatherOptions& gather = request.gather;
   json["bounces"] = request.bounces;
@@ -162,7 +162,7 @@ void put_gather(OrderedJson& json, const LightingRequest& request) {
   json["sides"] = static_cast<unsigned>(gather.sides);
 }
 
-/// Reads them.
+/// Reads what put_gather() adds.
 void get_gather(const OrderedJson& json, LightingRequest& request) {
   GatherOptions& gather = request.gather;
   request.bounces = json.at("bounces");

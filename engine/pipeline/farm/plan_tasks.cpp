@@ -51,6 +51,15 @@ void add_final_scene(const FarmPlan& plan, std::vector<std::filesystem::path>& i
   }
 }
 
+/// Adds the files of the scene with the light of all bounces but the last, if there is more than
+/// one.
+void add_bounced(const FarmPlan& plan, unsigned bounces,
+                 std::vector<std::filesystem::path>& inputs) {
+  if (bounces < 2) return;
+  const unsigned wave = bounces - 1;
+  add_scene(plan, {TaskKind::bounce, wave}, {TaskKind::join_bounce, wave}, inputs);
+}
+
 /// Adds a task for each part of the scene, and one that joins what they write.
 /// @param inputs   of each
 /// @param after    whose tasks they need
@@ -108,7 +117,7 @@ TaskStep add_light(FarmPlan& plan, std::uint64_t memory_bytes) {
     const TaskStep step{TaskKind::bounce, wave}, join{TaskKind::join_bounce, wave};
     std::vector<std::filesystem::path> inputs;
     add_final_scene(plan, inputs);
-    if (wave > 1) add_scene(plan, {TaskKind::bounce, wave - 1}, last, inputs);
+    add_bounced(plan, wave, inputs);
     add_parts(plan, step, join, last, inputs, memory_bytes, kBounceSeconds);
     last = join;
   }
@@ -122,10 +131,7 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
   TaskStep before = after;
   std::vector<std::filesystem::path> seen;
   add_final_scene(plan, seen);
-  if (const unsigned bounces = plan.shading->request.bounces; bounces > 1) {
-    const unsigned wave = bounces - 1;
-    add_scene(plan, {TaskKind::bounce, wave}, {TaskKind::join_bounce, wave}, seen);
-  }
+  add_bounced(plan, plan.shading->request.bounces, seen);
   if (plan.shading->request.error) {
     before = {TaskKind::tune};
     plan.tasks.push_back({.step = before,
@@ -171,10 +177,7 @@ void add_shading(FarmPlan& plan, const TaskStep& after, std::uint64_t memory_byt
 void add_frames(FarmPlan& plan, std::uint64_t memory_bytes) {
   std::vector<std::filesystem::path> inputs;
   add_final_scene(plan, inputs);
-  if (plan.renders_bounces()) {
-    const unsigned wave = plan.frames->lighting.bounces - 1;
-    add_scene(plan, {TaskKind::bounce, wave}, {TaskKind::join_bounce, wave}, inputs);
-  }
+  if (plan.renders_bounces()) add_bounced(plan, plan.frames->lighting.bounces, inputs);
   const TaskStep after = plan.tasks.back().step;
   for (std::size_t i = 0; i < plan.frames->count(); ++i) {
     plan.tasks.push_back({.step = {TaskKind::frame},
@@ -273,6 +276,10 @@ bool FarmPlan::renders_bounces() const noexcept {
 
 const LightingRequest& FarmPlan::bounce_settings() const noexcept {
   return shading && shading->request.bounces > 1 ? shading->request : frames->lighting;
+}
+
+std::filesystem::path FarmPlan::bounced(unsigned bounces) const {
+  return output({TaskKind::join_bounce, bounces - 1}, 0);
 }
 
 std::filesystem::path FarmPlan::output(const TaskStep& step, std::size_t number) const {

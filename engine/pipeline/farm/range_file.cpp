@@ -248,8 +248,7 @@ RangeBlocks read_ranges(const std::filesystem::path& path, std::uint64_t plan, c
     xxh3.push_back(entries.get<std::uint64_t>());
     digests.emplace_back();
     for (std::size_t set = 0; set <= row.group_bytes.size(); ++set) {
-      const auto low = entries.get<std::uint64_t>();
-      digests.back().push_back({low, entries.get<std::uint64_t>()});
+      digests.back().push_back({entries.get<std::uint64_t>(), entries.get<std::uint64_t>()});
     }
   }
   require(std::ranges::is_sorted(begin), "the index of the file is damaged");

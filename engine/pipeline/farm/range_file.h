@@ -47,7 +47,8 @@ struct RangeBlock {
 /// The blocks of some ranges.
 struct RangeBlocks {
   std::vector<RangeBlock> blocks;  ///< range by range, in the order of the file
-  /// Of all their records, and of the values of each group with the keys of their points.
+  /// The digest of the points of all blocks, and then one for each group of channels: of the values
+  /// of these points, each with the key of its point.
   std::vector<RecordsDigest> digests;
 };
 
@@ -80,7 +81,7 @@ class RangeWriter {
   struct Open {
     std::vector<PointRecord> points;
     std::vector<std::byte> values;       ///< group after group, each with room for a whole block
-    std::vector<RecordsDigest> digests;  ///< of the blocks that were written, as of RangeBlocks
+    std::vector<RecordsDigest> digests;  ///< RangeBlocks::digests of the blocks that were written
   };
 
   [[nodiscard]] std::size_t range_of(const MortonKey& key) const;

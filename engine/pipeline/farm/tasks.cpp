@@ -122,8 +122,7 @@ bool light(const FarmPlan& plan, const FarmTask& task, const RunOptions& run, Pr
 void use_bounces(const FarmPlan& plan, const RunOptions& run, LightingRequest& request) {
   request.scene = plan.scene;
   request.run = run;
-  if (request.bounces > 1)
-    request.bounced = plan.output({TaskKind::join_bounce, request.bounces - 1}, 0);
+  if (request.bounces > 1) request.bounced = plan.bounced(request.bounces);
 }
 
 /// Returns the request for the shading of a plan.
