@@ -36,7 +36,7 @@ class Run:
     def __init__(self, arguments):
         self.arguments, self.bin, self.here = arguments, arguments.bin.resolve(), arguments.folder.resolve()
         self.here.mkdir(parents=True, exist_ok=True)
-        self.shade = ["--count", arguments.count, "--bounces", "1", *(["--error", arguments.error] if arguments.error else [])]
+        self.shade = ["--count", arguments.count, "--bounces", arguments.bounces, *(["--error", arguments.error] if arguments.error else [])]
         self.plan, self.rows, self.notes = self.here / "farm.json", [], []
 
     def call(self, program, *words):
@@ -59,7 +59,7 @@ class Run:
 
     def farm(self):
         """Runs the plan on a cluster, and kills a node when a third of the parts are lit."""
-        self.call("ptcfarm", "plan", "--city", self.arguments.points, "--task-memory", "1G", *LIGHTS, "--shade", self.here / "farm.ply",
+        self.call("ptcfarm", "plan", "--city", self.arguments.points, "--task-memory", self.arguments.task_memory, *LIGHTS, "--shade", self.here / "farm.ply",
                   *self.shade, "--ranges", 16, "-o", self.plan)
         tasks = json.loads(self.plan.read_text())["tasks"]
         begun = time.time()
@@ -122,9 +122,9 @@ class Run:
         same = farm == one and filecmp.cmp(self.here / "farm.ply", self.here / "one.ply", shallow=False)
         self.notes.append(f"Points: {one[1]:,}. Digest of the tree: {one[0]} on one machine, {farm[0]} by the cluster; the files of shaded points "
                           f"are {'equal, byte for byte' if same else 'DIFFERENT'}.")
+        settings = " ".join(f"--{name.replace('_', '-')} {getattr(self.arguments, name)}" for name in ("points", "count", "bounces", "task_memory"))
         text = ["# A city by a cluster of Slurm", "",
-                "Written by `python3 tests/farm/slurm_run.py build/release/bin FOLDER --points "
-                f"{self.arguments.points} --count {self.arguments.count} --output ...`, one run. A real slurmctld and four slurmd on "
+                f"Written by `python3 tests/farm/slurm_run.py build/release/bin FOLDER {settings} --output ...`, one run. A real slurmctld and four slurmd on "
                 f"one machine of {os.cpu_count()} cores, so that nodes share its cores and its disk: the times say what tasks cost, not what four machines gain.", "",
                 "| step | by | tasks | wall s | CPU s |", "|---|---|---|---|---|"]
         text += ["| " + " | ".join(map(str, row)) + " |" for row in self.rows]
@@ -140,6 +140,8 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     parser.add_argument("--points", default="200M")
     parser.add_argument("--count", default="16k")
+    parser.add_argument("--bounces", default="1", help="from 2 on, waves of tasks light all points again before the count is shaded")
+    parser.add_argument("--task-memory", default="1G", help="the cap of each task: smaller ones make more parts")
     parser.add_argument("--error")
     parser.add_argument("--output", type=Path, required=True)
     arguments = parser.parse_args()
