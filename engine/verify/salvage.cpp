@@ -30,6 +30,7 @@
 #include "engine/parallel/thread_pool.h"
 #include "engine/store/commit.h"
 #include "engine/store/writer.h"
+#include "engine/verify/survey.h"
 #include "engine/verify/surveyed_page.h"
 #include "format/bytes.h"
 #include "format/checksum.h"
@@ -39,7 +40,6 @@
 namespace ptc {
 namespace {
 
-constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
 // Memory for each page of the file: its site, twice where pages moved, and entries of two maps.
 constexpr std::uint64_t kPageBytes = 320;
 constexpr std::uint64_t kPagesOpen =
@@ -318,7 +318,7 @@ class Salvage {
     for (const Remains* source : sources_)
       pages += source->survey().sites.size() + source->survey().void_pages.size();
     MemoryBudget budget(options_.memory_bytes, "the salvage of this file", "memory_bytes");
-    budget.charge("the program", kBaseBytes);
+    budget.charge("the program", kProgramBytes);
     if (file_.file().is_remote()) budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
     budget.charge("the list of pages", kPageBytes * pages);
     budget.charge("open pages", kPagesOpen << header().page_shift);

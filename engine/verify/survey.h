@@ -17,6 +17,10 @@
 
 namespace ptc {
 
+/// Memory that a verification or a salvage takes whatever the file is: the program, its libraries,
+/// small buffers.
+inline constexpr std::uint64_t kProgramBytes = std::uint64_t{32} << 20;
+
 /// A page of the file and where it lies, according to the directory or to its own header.
 struct PageSite {
   DirectoryEntry entry;

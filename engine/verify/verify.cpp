@@ -28,6 +28,7 @@
 #include "engine/store/commit.h"
 #include "engine/verify/checked_pages.h"
 #include "engine/verify/rebuild.h"
+#include "engine/verify/survey.h"
 #include "engine/verify/surveyed_page.h"
 #include "engine/verify/verify_tree.h"
 #include "format/parts_page.h"
@@ -38,7 +39,6 @@ namespace {
 
 constexpr char kPadding[] = "spec/container.md#padding";
 
-constexpr std::uint64_t kBaseBytes = std::uint64_t{32} << 20;  // program, libraries, small buffers
 constexpr std::size_t kMaxCachedPages = 1024;  // of the tree that is compared with another
 constexpr std::size_t kPagesAtOnce = 256;
 
@@ -101,7 +101,7 @@ class FileCheck {
     const std::uint64_t groups =
         survey_.container ? s.node_groups : 0;  // a superblock alone proves no number of groups
     MemoryBudget budget(options_.memory_bytes, "this file", "memory_bytes");
-    budget.charge("the program", kBaseBytes);
+    budget.charge("the program", kProgramBytes);
     if (file_.is_remote()) budget.charge(RemoteFile::kMemory, RemoteFile::kMemoryBytes);
     budget.charge("the list of pages", 110 * survey_.sites.size());
     budget.charge("groups of nodes", groups / 8);

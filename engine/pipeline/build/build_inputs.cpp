@@ -1,4 +1,4 @@
-// Two passes over the inputs of a build.
+// The first of two passes over the inputs of a build.
 //
 //   read_inputs()   files --> bounds, about 2^16 sample positions, meshes in memory or spilled
 //   feed_inputs()   files, meshes, city --> blocks of 2^14 surfels --> records --> sort
@@ -10,24 +10,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include "engine/base/error.h"
 #include "engine/base/memory.h"
-#include "engine/io/cloud/las_vlrs.h"
-#include "engine/io/cloud/points.h"
-#include "engine/io/cloud/record.h"
 #include "engine/io/file/url.h"
-#include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/pipeline/build/scene_file.h"
 #include "engine/pipeline/build/unknown_values.h"
-#include "engine/pipeline/convert/convert.h"
 #include "engine/pipeline/point_input.h"
 #include "engine/pipeline/run.h"
 #include "engine/pipeline/scene_record.h"
@@ -35,21 +27,6 @@
 
 namespace ptc {
 namespace {
-
-constexpr std::size_t kBlock = 1 << 14;       // surfels read from a source at once
-constexpr std::size_t kSampleKeys = 1 << 16;  // positions that the sort's splitters need
-// Bytes of the records of a LAS file, which share the meta page with all that a container records.
-constexpr std::size_t kMaxContainerRecords = std::size_t{1} << 14;
-
-/// Drops every second position of a sample that is twice as large as the sort needs.
-/// @param step  of how many points one is in the sample; doubles with it, so that the points of all
-///              files have the same share
-void thin(std::vector<glm::dvec3>& sample, std::uint64_t& step) {
-  if (sample.size() < 2 * kSampleKeys) return;
-  for (std::size_t i = 0; i < sample.size() / 2; ++i) sample[i] = sample[2 * i];
-  sample.resize(sample.size() / 2);
-  step *= 2;
-}
 
 /// Returns a grid of 256 x 256 positions on the ground of the city, in scene units.
 std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
@@ -68,22 +45,6 @@ std::vector<glm::dvec3> sample_ground(const Bounds& bounds) {
   return sample;
 }
 
-/// Returns the number of a point's scanner among all of the inputs.
-/// @param row  the attributes of the point
-std::uint32_t scanner_of(const Clouds::Cloud& cloud, const std::byte* row) {
-  if (cloud.first_scanner == kNoScanner) return kNoScanner;
-  std::uint32_t own = 0;
-  std::memcpy(&own, row + cloud.scanner_offset, cloud.scanner_bytes);
-  return cloud.first_scanner + own;
-}
-
-/// Marks a record whose normal is to be estimated.
-void mark_unknown_normal(PointRecord& record, std::uint32_t scanner) {
-  static_assert(sizeof record.normal == sizeof scanner);
-  std::memcpy(record.normal.data(), &scanner, sizeof scanner);
-  record.flags = kUnknownNormal;
-}
-
 /// Says whether a cloud was seen from above: it is far wider than high.
 bool is_aerial(const Bounds& bounds, const glm::dvec3& up) {
   constexpr double kFlat = 0.3;  // height by width
@@ -95,64 +56,6 @@ bool is_aerial(const Bounds& bounds, const glm::dvec3& up) {
   }
   return height <= kFlat * width;
 }
-
-/// The sorts of a build, which take the points of one source after another.
-class Feeder {
- public:
-  /// @param first  number of the first point among all of the container
-  Feeder(const AttributePlan& plan, const Frame& frame, std::uint64_t first, ExternalSorter& sorter,
-         AttributeSorts& attributes, const Executor& executor, Progress& progress)
-      : plan_(plan),
-        frame_(frame),
-        sorter_(sorter),
-        attributes_(attributes),
-        executor_(executor),
-        progress_(progress),
-        points_(first) {}
-
-  /// Feeds all points of a source. @return the number of points
-  /// @param cloud  what is known of the source; the default: it has no channels
-  std::uint64_t feed(PointSource& source, const Clouds::Cloud& cloud = {}) {
-    const std::uint64_t before = points_;
-    while (const std::size_t count = source.next(surfels_)) {
-      const std::span<const std::byte> rows = source.attributes();
-      const std::size_t row_bytes = rows.size() / count;
-      if (cloud.said) require_within(*cloud.said, count, cloud.path);
-      executor_.for_ranges(count, 1 << 11, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          records_[i] = to_record(surfels_[i], frame_);
-          if (surfels_[i].normal == glm::vec3(0))
-            mark_unknown_normal(records_[i], scanner_of(cloud, rows.data() + i * row_bytes));
-        }
-      });
-      const auto block = std::span<const PointRecord>(records_).first(count);
-      sorter_.add(block);
-      attributes_.add(plan_, block, cloud.input, rows, points_);
-      points_ += count;
-      progress_.advance(count);
-    }
-    return points_ - before;
-  }
-
- private:
-  /// Compares the surfels that were read last with what their file says of their place.
-  void require_within(const Bounds& said, std::size_t count, const std::filesystem::path& path) {
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!said.contains(surfels_[i].position))
-        throw BoundsExceeded(path.string() + ": a point lies outside the bounds of its header");
-    }
-  }
-
-  const AttributePlan& plan_;
-  const Frame& frame_;
-  ExternalSorter& sorter_;
-  AttributeSorts& attributes_;
-  const Executor& executor_;
-  Progress& progress_;
-  std::vector<Surfel> surfels_ = std::vector<Surfel>(kBlock);
-  std::vector<PointRecord> records_ = std::vector<PointRecord>(kBlock);
-  std::uint64_t points_;  ///< number of the next point
-};
 
 BuildInputs lay_city(std::uint64_t points) {
   const Bounds bounds = city_bounds(points);
@@ -359,151 +262,11 @@ std::vector<glm::dvec3> places_on(const Mesh& mesh, std::uint32_t first) {
   return sample;
 }
 
-void Clouds::measure(const std::filesystem::path& path, const std::optional<Placement>& place,
-                     const Selection& selection, BoundsFrom from, bool alone, Progress& progress) {
-  PointFile file = open_placed_points(path, selection, place);
-  // Note what the file says of all its points, once
-  const std::string name = file_name(path);
-  if (from == BoundsFrom::files) {
-    for (const std::string& note : file.info.notes) progress.note(name + ": " + note);
-  }
-  if (const auto lights = file.info.text.find(kLightsKey); lights != file.info.text.end()) {
-    const auto first = text.find(kLightsKey);
-    lights_differ |= first != text.end() && first->second != lights->second;
-  }
-  join_texts(text, named_by, file.info.text, name, progress);
-  unlit |= !file.info.has_radiance;
-  const bool contained = is_container(path);
-  has_container |= contained;
-  coloured |= file.info.has_albedo;
-  Cloud& cloud = files.emplace_back(Cloud{.path = path, .place = place});
-  note_scan(file.info, cloud);
-  cloud.channels = std::move(file.info.channels);
-  // Take what it says of their place, or read them
-  const bool place_suffices = from == BoundsFrom::files && alone && file.info.count &&
-                              !file.info.has_normals && !file.info.has_radius &&
-                              !file.info.has_emission;
-  if (auto told = place_suffices ? file.source->extent() : std::nullopt) {
-    cloud.said = told->bounds;
-    cloud.points = *file.info.count;
-    bounds.add(told->bounds);
-    sample = std::move(told->sample);
-  } else {
-    read_points(file, alone, cloud, progress);
-  }
-  points += cloud.points;
-  has_lit_container |= contained && file.info.has_radiance && cloud.points > 0;
-}
-
-void Clouds::shorten_records(Progress& progress) {
-  const auto records = text.find(kLasRecordsKey);
-  if (records == text.end()) return;
-  ShortVlrs shorter = shorten_vlrs(records->second, kMaxContainerRecords,
-                                   "a container keeps only 16 KiB of records");
-  const std::string& name = named_by.at(kLasRecordsKey);
-  for (const std::string& note : shorter.notes) progress.note(name + ": " + note);
-  las_records = std::exchange(records->second, std::move(shorter.text));
-  if (records->second.empty()) text.erase(records);
-}
-
-/// Reads the points of a cloud and notes what they need.
-void Clouds::read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress) {
-  ValueWatch watch(alone ? std::span<const Channel>() : cloud.channels);
-  bool lacks_normals = false, lacks_radii = true;
-  std::vector<Surfel> block(kBlock);
-  while (const std::size_t count = file.source->next(block)) {
-    for (std::size_t i = 0; i < count; ++i) {
-      bounds.add(block[i].position);
-      lacks_normals |= block[i].normal == glm::vec3(0);
-      lacks_radii = lacks_radii && block[i].radius == 0;
-    }
-    emits |= std::any_of(block.begin(), block.begin() + static_cast<std::ptrdiff_t>(count),
-                         [](const Surfel& s) { return s.emission != glm::vec3(0); });
-    for (std::size_t i = 0; i < count; ++i) {
-      if ((cloud.points + i) % sample_step == 0) sample.push_back(block[i].position);
-    }
-    thin(sample, sample_step);
-    watch.add(file.source->attributes());
-    cloud.points += count;
-    progress.advance(count);
-  }
-  cloud.taken = watch.taken();
-  if ((lacks_normals || (lacks_radii && cloud.points > 0)) && !scan) scan.emplace().radii = false;
-  if (scan && cloud.points > 0)
-    scan->radii |= lacks_radii;  // formats that must have radii have zeros
-  if (const std::uint64_t lost = file.source->left_out()) {
-    progress.note(
-        fmt::format("{}: {} records name no place and are left out", file_name(cloud.path), lost));
-  }
-}
-
-/// Notes what of the points of a cloud must be estimated, and where its scanners stood.
-void Clouds::note_scan(const PointFileInfo& info, Cloud& cloud) {
-  if (!info.has_normals || !info.has_radius) {
-    if (!scan) scan.emplace().radii = false;
-    scan->radii |= !info.has_radius;
-  }
-  if (info.scanners.empty()) return;
-  cloud.first_scanner = static_cast<std::uint32_t>(scanners.size());
-  scanners.insert(scanners.end(), info.scanners.begin(), info.scanners.end());
-  if (const auto found = find_in_row(info.channels, "scan")) {
-    cloud.scanner_offset = found->offset;
-    cloud.scanner_bytes = std::min(found->channel->component_bytes(), sizeof(std::uint32_t));
-  }
-}
-
 BuildInputs read_inputs(const BuildRequest& request, BoundsFrom from, const ContainerReader* scene,
                         const MeshLimits& limits, StageSeconds& seconds, Progress& progress) {
   if (request.city_points > 0) return lay_city(request.city_points);
   const Stage stage(seconds, progress, "read", 0, "points");
   return read_files(request, from, scene, limits, progress);
-}
-
-double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   std::uint64_t first, const SamplingRoom& room, ExternalSorter& sorter,
-                   AttributeSorts& attributes, const Executor& executor, Progress& progress) {
-  Feeder feeder(inputs.attributes, frame, first, sorter, attributes, executor, progress);
-  if (request.city_points > 0) feeder.feed(*make_city(request.city_points));
-  for (const Clouds::Cloud& cloud : inputs.clouds.files) {
-    const PointFile file = open_placed_points(cloud.path, request.selection, cloud.place);
-    if (feeder.feed(*file.source, cloud) == cloud.points) continue;
-    throw DataError(cloud.path.string() + ": the file changed while it was read");
-  }
-  double spacing = 0;
-  if (const LitMesh* lit = inputs.lit.get()) {
-    SamplingOptions sampling = request.sampling;
-    if (!inputs.rays_at_emitters) sampling.lights.area_rays = 0;
-    if (sampling.spacing == 0) {
-      sampling =
-          with_spacing(sampling, seen_area(lit->light, lit->rays, sampling.lights, executor));
-    }
-    spacing = sampling.spacing;
-    sampling.keeps_dark = inputs.keeps_dark;
-    feeder.feed(*sample_mesh(lit->light, lit->rays, sampling, executor, room.at_once, lit->first));
-    if (lit->first > 0) {
-      const std::uint32_t moving = lit->first;
-      const LightRig lights = lit->light.rig();
-      Mesh mesh = std::move(inputs.lit->mesh);
-      inputs.lit.reset();
-      inputs.still_light =
-          std::make_unique<StillLight>(std::move(mesh), moving, lights, sampling.lights);
-    }
-  }
-  inputs.lit.reset();
-  if (const StreamedMeshes* streamed = inputs.streamed.get()) {
-    const SamplingOptions sampling = with_spacing(request.sampling, streamed->found.area);
-    spacing = sampling.spacing;
-    if (streamed->parts.size() > 0) {
-      feeder.feed(
-          *sample_parts(streamed->parts, streamed->found, sampling, room.streaming, executor));
-    }
-    if (!streamed->parts.placed().empty()) {
-      feeder.feed(
-          *sample_placed(streamed->parts, streamed->found, sampling, room.streaming, executor));
-    }
-  }
-  inputs.streamed.reset();
-  return spacing;
 }
 
 }  // namespace ptc

@@ -1,101 +1,30 @@
-// The inputs of a build: meshes, clouds or the city. They are measured first and then fed to the
-// sort, because the sort needs the bounds and a sample of the points before the first of them.
+// The inputs of a build: meshes, clouds or the city. They are measured first, because the sort
+// needs the bounds and a sample of the points before the first of them (feed_inputs.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <filesystem>
-#include <map>
 #include <memory>
-#include <optional>
-#include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
-#include "engine/base/error.h"
 #include "engine/base/executor.h"
 #include "engine/base/progress.h"
-#include "engine/io/cloud/points.h"
 #include "engine/io/mesh/mesh.h"
 #include "engine/pipeline/build/attributes.h"
 #include "engine/pipeline/build/build_container.h"
+#include "engine/pipeline/build/clouds.h"
 #include "engine/pipeline/build/meshes.h"
 #include "engine/pipeline/build/still_light.h"
-#include "engine/scan/scan.h"
 #include "engine/scene/light/direct_light.h"
 #include "engine/scene/light/lights.h"
 #include "engine/scene/ray_scene.h"
 #include "engine/scene/sampling/mesh_parts.h"
 #include "engine/scene/sampling/placed_sampler.h"
 #include "engine/scene/sampling/solids.h"
-#include "engine/scene/sampling/streamed_sampler.h"
-#include "engine/sort/external_sort.h"
 
 namespace ptc {
-
-/// Where the bounds of clouds come from. Those that a file says of itself save a pass over it; a
-/// build that begins again because they were wrong takes those of the points.
-enum class BoundsFrom { files, points };
-
-/// Thrown when a point lies beyond the bounds that its file says. The build must measure the points
-/// themselves.
-class BoundsExceeded : public DataError {
- public:
-  using DataError::DataError;
-};
-
-/// The clouds of a request, checked and measured in a first pass.
-struct Clouds {
-  struct Cloud {
-    std::filesystem::path path;
-    std::optional<Placement> place;  ///< none: the points stay where they are
-    std::uint64_t points = 0;
-    std::vector<Channel> channels;                ///< in the order of its rows
-    std::vector<bool> taken;                      ///< as for AttributePlan::add_input()
-    std::size_t input = AttributePlan::kNoInput;  ///< its number in the plan of the channels
-    std::uint32_t first_scanner = kNoScanner;     ///< the number of the first of its scanners
-    /// Where the number of its scanner lies in the row of a point, and its bytes; 0 bytes when all
-    /// points are of the first.
-    std::size_t scanner_offset = 0, scanner_bytes = 0;
-    std::optional<Bounds> said;  ///< the box of PointSource::extent(), if the points were not read
-  };
-  std::vector<Cloud> files;
-  Bounds bounds;                   ///< of all points, scene units
-  std::vector<glm::dvec3> sample;  ///< positions of an even share of the points, scene units
-  std::uint64_t sample_step = 1;   ///< of how many points one is in the sample
-  std::uint64_t points = 0;        ///< in all files
-  /// How the points are completed, without the resources; empty when all have normals and radii.
-  std::optional<ScanOptions> scan;
-  bool unlit = false;                ///< one of the files gives no radiance
-  bool has_container = false;        ///< one of the files is a container
-  bool has_lit_container = false;    ///< one of the files is a container whose points have light
-  bool lights_differ = false;        ///< the files record different lights; the first ones count
-  bool coloured = false;             ///< one of the files gives colours
-  bool emits = false;                ///< a point emits light
-  std::vector<glm::dvec3> scanners;  ///< of all files, scene units
-  /// Facts about the files under the keys of spec/points.md#texts, by join_texts(). Of the records
-  /// of a LAS file there are as many as a container keeps.
-  std::map<std::string, std::string> text;
-  std::map<std::string, std::string> named_by;  ///< by key of `text`: the file that it is of
-  std::string las_records;  ///< all records of the LAS file, once shorten_records() has run
-
-  /// Adds a cloud to the others, in a place. Reads it to its end, unless all that is asked stands
-  /// in front of its points.
-  /// @param alone  whether all points of the build are of this cloud, whose values need no watch
-  /// @throws DataError when the file breaks its format; RequestError, FormatError as
-  ///         open_point_input()
-  void measure(const std::filesystem::path& path, const std::optional<Placement>& place,
-               const Selection& selection, BoundsFrom from, bool alone, Progress& progress);
-
-  /// Moves the records of a LAS file to `las_records`, and shortens them in `text` to what a
-  /// container keeps.
-  /// @param progress  gets a note about each kind of records that is left out
-  void shorten_records(Progress& progress);
-
- private:
-  void read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress);
-  void note_scan(const PointFileInfo& info, Cloud& cloud);
-};
 
 /// The joined meshes of a request, ready for rays and light. It is destroyed before the sort needs
 /// its memory.
@@ -154,22 +83,6 @@ struct BuildInputs {
 /// Returns about 2^16 places that are spread over a mesh by area, scene units.
 /// @param first  the first triangle that counts
 [[nodiscard]] std::vector<glm::dvec3> places_on(const Mesh& mesh, std::uint32_t first = 0);
-
-/// What the sampling of meshes may use.
-struct SamplingRoom {
-  unsigned at_once = 0;     ///< patches of a mesh in memory, as for sample_mesh()
-  StreamingRoom streaming;  ///< of meshes on the disk
-};
-
-/// Feeds the surfels of all inputs to the sort, and what is recorded of them beyond that to the
-/// sorts of attributes. Meshes are sampled and lit on the way, and freed afterwards.
-/// @param first  number of points that the container has before these
-/// @param room    for sampling
-/// @return  distance between neighbouring surfels on the meshes, scene units; 0 without meshes
-/// @throws BoundsExceeded; DataError when a cloud changed since it was measured; std::system_error
-double feed_inputs(BuildInputs& inputs, const BuildRequest& request, const Frame& frame,
-                   std::uint64_t first, const SamplingRoom& room, ExternalSorter& sorter,
-                   AttributeSorts& attributes, const Executor& executor, Progress& progress);
 
 /// Returns the coordinates of a point as the array that Frame takes.
 [[nodiscard]] inline std::array<double, 3> to_array(const glm::dvec3& p) {

@@ -19,7 +19,7 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kEndBytes = std::size_t{64} << 10;  // compared of either end of a file
+constexpr std::size_t kComparedBytes = std::size_t{64} << 10;  // compared of either end of a file
 
 InputState state_of_container(const std::filesystem::path& path) {
   const ContainerReader container(path, ContainerReader::OpenParts::no);
@@ -39,8 +39,8 @@ InputState state_of(const std::filesystem::path& path) {
       .bytes = file.size(),
       .modified_ns = std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + status.st_mtim.tv_nsec};
   std::vector<std::byte> ends(
-      static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), 2 * kEndBytes)));
-  const auto head = std::span(ends).first(std::min(ends.size(), kEndBytes));
+      static_cast<std::size_t>(std::min<std::uint64_t>(file.size(), 2 * kComparedBytes)));
+  const auto head = std::span(ends).first(std::min(ends.size(), kComparedBytes));
   const auto tail = std::span(ends).subspan(head.size());
   file.read_at(0, head);
   file.read_at(file.size() - tail.size(), tail);

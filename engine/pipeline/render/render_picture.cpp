@@ -34,7 +34,7 @@ constexpr std::uint64_t kReceiverBytes = 344;
 constexpr std::uint64_t kEstimateBytes = sizeof(Shading) + sizeof(ErrorEstimate);
 
 /// What a run renders of a request.
-struct Part {
+struct PicturePart {
   bool emission = true;          ///< whether the meshes emit
   std::uint64_t held_bytes = 0;  ///< for each pixel, of the pictures of other parts
   TextureTile tile;              ///< that is baked, if it is a texture
@@ -44,7 +44,8 @@ struct Part {
 /// Returns a budget that is charged with everything that rendering takes besides the gather.
 /// @param view  of the surfels, if the subject has no mesh
 MemoryBudget picture_budget(const RenderRequest& request, std::span<const PictureTarget> targets,
-                            const Part& part, const Subject& subject, const SurfelViewBytes& view) {
+                            const PicturePart& part, const Subject& subject,
+                            const SurfelViewBytes& view) {
   MemoryBudget budget = budget_of(request.run.memory_bytes, "this picture");
   const bool glossy = request.glossy.roughness.has_value();
   const std::uint64_t receiver =
@@ -84,7 +85,7 @@ using RowsSeen = std::function<void(const Film& rows, unsigned first, const Subj
 
 /// Renders the pictures of a container.
 LightingReport render_part(const RenderRequest& request, std::span<const PictureTarget> targets,
-                           const Part& part, Continuity& kept, const RowsSeen& done,
+                           const PicturePart& part, Continuity& kept, const RowsSeen& done,
                            Progress& progress) {
   // Open the scene and load what the camera sees
   LightingReport report;
@@ -249,7 +250,8 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
         }
         sum->add_group(group_channel(groups[i]), rows, first);
       };
-      const Part part{.emission = groups[i].empty(), .held_bytes = sum_bytes, .moment = moment};
+      const PicturePart part{
+          .emission = groups[i].empty(), .held_bytes = sum_bytes, .moment = moment};
       add_costs(of_picture,
                 render_part(one, targets, part, kept, add, frame == 0 ? progress : silent));
     }
@@ -264,7 +266,7 @@ LightingReport render_groups(const RenderRequest& request, std::span<const Pictu
 
 /// Renders the pictures of a container, or bakes one tile of a texture.
 LightingReport render_files(const RenderRequest& request, std::span<const PictureTarget> targets,
-                            const Part& part, Continuity& kept, Progress& progress) {
+                            const PicturePart& part, Continuity& kept, Progress& progress) {
   std::vector<PictureTarget> of_frame(targets.begin(), targets.end());
   std::optional<PictureFiles> files;
   LightingReport shown;
