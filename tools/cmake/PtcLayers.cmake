@@ -48,8 +48,7 @@ endif()
 
 # ptc_compile_together(<target> <number>) compiles files in groups of that number: most of the time of each went to
 # headers and templates that all of them need. Only for Release: the other presets compile each file alone, and find
-# what one includes too little. Sources that include themselves once for each instruction set stay alone, and so do
-# experiments, whose tables have the same names.
+# what one includes too little. Sources that include themselves once for each instruction set stay alone.
 function(ptc_compile_together target number)
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
     get_target_property(sources ${target} SOURCES)
@@ -58,7 +57,7 @@ function(ptc_compile_together target number)
       if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/${source})
         file(STRINGS ${source} many REGEX "HWY_TARGET_INCLUDE")
       endif()
-      if(many OR source MATCHES "_experiment\\.cpp$")
+      if(many)
         set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
       endif()
     endforeach()
@@ -87,7 +86,7 @@ function(ptc_add_layer path)
     set_target_properties(ptc_${name} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON INTERFACE_HEADER_SETS_TO_VERIFY alone)
   endif()
   target_link_libraries(ptc_${name} PUBLIC ptc_options ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
-  if(NOT name MATCHES "^(format|stability)$")  # constants of their files have the same names
+  if(NOT name STREQUAL "format")  # constants of its files have the same names
     ptc_compile_together(ptc_${name} 8)
   endif()
   foreach(layer IN LISTS PTC_LAYERS_${path})

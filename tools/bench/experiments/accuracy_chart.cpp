@@ -88,12 +88,12 @@ void append(Chart& chart, const std::vector<ChartPanel>& panels) {
 }
 
 /// A share as a percentage.
-std::string percent(double share) {
+std::string percent_text(double share) {
   return std::isfinite(share) ? fmt::format("{:.2g} %", 100 * share)
                               : std::string("an unknown share");
 }
 
-constexpr char kReading[] =
+constexpr char kAccuracyChartReading[] =
     "Markers are medians of all runs, bars reach from the fastest to the slowest run. Labels: "
     "solid "
     "angle in sr for PTCX and the plain gather, rays per receiver for rays.\n";
@@ -106,20 +106,22 @@ std::string note_text(const ReferenceNote& note, const SceneAccuracy& scene) {
       "own "
       "error is {} of the mean occlusion",
       note.scene, note.set, scene.surfels, note.receivers, note.rays,
-      percent(note.occlusion_noise));
+      percent_text(note.occlusion_noise));
   const bool light = note.irradiance_mean > 0;
-  if (light) text += fmt::format(" and {} of the mean irradiance", percent(note.irradiance_noise));
+  if (light)
+    text += fmt::format(" and {} of the mean irradiance", percent_text(note.irradiance_noise));
   text += ".";
   if (!std::isfinite(note.occlusion_floor)) return text;
-  text +=
-      fmt::format(" Rays at the discs and at the mesh differ by {}", percent(note.occlusion_floor));
-  if (light) text += " and " + percent(note.irradiance_floor);
+  text += fmt::format(" Rays at the discs and at the mesh differ by {}",
+                      percent_text(note.occlusion_floor));
+  if (light) text += " and " + percent_text(note.irradiance_floor);
   return text + ".";
 }
 
 Chart chart_of(const SceneAccuracy& scene) {
-  Chart chart{
-      .title = "Time per receiver against error: " + scene.name(), .note = kReading, .columns = 1};
+  Chart chart{.title = "Time per receiver against error: " + scene.name(),
+              .note = kAccuracyChartReading,
+              .columns = 1};
   for (const ReferenceNote& note : scene.references) {
     std::string title = note.set + ": ";
     title.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(title.front())));
@@ -132,7 +134,8 @@ Chart chart_of(const SceneAccuracy& scene) {
 }
 
 Chart chart_of(const std::vector<SceneAccuracy>& scenes) {
-  Chart chart{.title = "Time per receiver against error", .note = kReading, .columns = 1};
+  Chart chart{
+      .title = "Time per receiver against error", .note = kAccuracyChartReading, .columns = 1};
   for (const SceneAccuracy& scene : scenes) {
     const std::size_t before = chart.panels.size();
     for (const ReferenceNote& note : scene.references) {

@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kAccuracyReading[] =
     "Time per receiver against error. Methods: ptcx is the hierarchical gather at settings from "
     "coarse to fine; ptcx-rays are stratified rays through the octree; plain is a gather of one "
     "receiver at a time; embree-discs and embree-mesh are "
@@ -28,7 +28,7 @@ Value times_thousand(const AccuracyRow& row, std::uint64_t count) {
   return when(row.counts.receivers > 0, static_cast<double>(count) / 1000);
 }
 
-const Columns<AccuracyRow>& columns() {
+const Columns<AccuracyRow>& accuracy_columns() {
   using R = AccuracyRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -92,7 +92,7 @@ Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs) {
   std::vector<ReferenceRow> references;
   Report report{.name = "accuracy",
                 .title = "Time per receiver against error: PTCX, plain gather and Embree",
-                .reading = kReading,
+                .reading = kAccuracyReading,
                 .runs = runs,
                 .figures = {{.chart = chart_of(scenes)}}};
   for (const SceneAccuracy& scene : scenes) {
@@ -101,7 +101,8 @@ Report report_of(const std::vector<SceneAccuracy>& scenes, unsigned runs) {
     report.figures.push_back({.part = scene.name(), .chart = chart_of(scene)});
   }
   report.tables = {
-      tabulate<AccuracyRow>({.name = "rows", .title = "Scene", .group = "scene"}, columns(), rows),
+      tabulate<AccuracyRow>({.name = "rows", .title = "Scene", .group = "scene"},
+                            accuracy_columns(), rows),
       tabulate<ReferenceRow>(
           {.name = "references", .title = "References that the errors are measured against"},
           reference_columns(), references)};

@@ -8,7 +8,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kBuildReading[] =
     "Builds of the procedural city, from a file of unsorted records of 40 bytes to a published "
     "container. Input and spilled records go past the system's cache. Profiles: compact is zstd, "
     "fast is LZ4. The floor is the time in which the same disk moves the bytes of the first "
@@ -78,7 +78,7 @@ ChartPanel panel_of(const std::vector<BuildRow>& rows, const std::string& name, 
 
 Chart chart_of(const std::vector<BuildRow>& rows) {
   Chart chart{.title = "Build from unsorted records, compared with the disk alone",
-              .note = kReading,
+              .note = kBuildReading,
               .columns = 2};
   const auto wall = [](const BuildRow& row) { return per_point_ns(row.wall.median, row); };
   const auto moved = [](const BuildRow& row) {
@@ -100,7 +100,7 @@ Chart chart_of(const std::vector<BuildRow>& rows) {
 Report report_of(const std::vector<BuildRow>& rows, unsigned runs) {
   return {.name = "build",
           .title = "Build from unsorted records, compared with the disk alone",
-          .reading = kReading,
+          .reading = kBuildReading,
           .runs = runs,
           .tables = {tabulate<BuildRow>({.name = "rows", .title = "Varied", .group = "panel"},
                                         columns_of(rows), rows)},

@@ -7,7 +7,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kCacheReading[] =
     "Shading of the procedural city with a page cache that holds only a share of its pages. "
     "Receivers are points of the city in blocks of neighbours; they get occlusion and irradiance. "
     "Each run begins with an empty cache, and with the file out of the system's cache. Cap: frames "
@@ -79,8 +79,9 @@ ChartPanel panel_of(const std::vector<CacheRow>& rows, const std::string& name, 
 }
 
 Chart chart_of(const std::vector<CacheRow>& rows) {
-  Chart chart{
-      .title = "Shading with a page cache smaller than the scene", .note = kReading, .columns = 3};
+  Chart chart{.title = "Shading with a page cache smaller than the scene",
+              .note = kCacheReading,
+              .columns = 3};
   const auto wall = [](const CacheRow& row) { return row.wall.median * each_ns(row) / 1000; };
   const auto wait = [](const CacheRow& row) { return row.wait.median * each_ns(row) / 1000; };
   const auto missed = [](const CacheRow& row) { return 100 * (1 - row.hit_rate); };
@@ -105,7 +106,7 @@ Chart chart_of(const std::vector<CacheRow>& rows) {
 Report report_of(const std::vector<CacheRow>& rows, unsigned runs) {
   return {.name = "cache",
           .title = "Shading with a page cache smaller than the scene",
-          .reading = kReading,
+          .reading = kCacheReading,
           .runs = runs,
           .tables = {tabulate<CacheRow>({.name = "rows", .title = "Part", .group = "panel"},
                                         columns_of(rows), rows)},

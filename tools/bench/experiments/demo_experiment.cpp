@@ -20,7 +20,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kDemoReading[] =
     "The work of ptcbuild, ptcverify, ptcshade and ptcrender on a scene under one memory cap, done "
     "by one process: reading the inputs, everything between, and writing the outputs. Peak memory "
     "is the maximum of resident memory of the whole program during a stage. Gather CPU is the time "
@@ -75,7 +75,7 @@ struct SceneDemo {
   std::vector<DemoError> errors;
 };
 
-const Columns<DemoRow>& columns() {
+const Columns<DemoRow>& demo_columns() {
   using R = DemoRow;
   const auto shaded = [](auto value) {
     return [value](const R& r) { return r.shaded ? value_of(value(*r.shaded)) : Value(); };
@@ -104,7 +104,7 @@ const Columns<DemoRow>& columns() {
   return columns;
 }
 
-const Columns<DemoError>& error_columns() {
+const Columns<DemoError>& demo_error_columns() {
   using R = DemoError;
   const auto error = [](auto member) { return path(&R::error, member); };
   static const Columns<R> columns{
@@ -257,15 +257,15 @@ Report report_of(const std::vector<SceneDemo>& scenes, unsigned runs) {
     rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
     errors.insert(errors.end(), scene.errors.begin(), scene.errors.end());
   }
-  return {
-      .name = "demo",
-      .title = "Time and memory from input to picture, and the error of the picture",
-      .reading = kReading,
-      .runs = runs,
-      .tables = {
-          tabulate<DemoRow>({.name = "rows", .title = "Scene", .group = "scene"}, columns(), rows),
-          tabulate<DemoError>({.name = "errors", .title = "Error of the picture against rays"},
-                              error_columns(), errors)}};
+  return {.name = "demo",
+          .title = "Time and memory from input to picture, and the error of the picture",
+          .reading = kDemoReading,
+          .runs = runs,
+          .tables = {
+              tabulate<DemoRow>({.name = "rows", .title = "Scene", .group = "scene"},
+                                demo_columns(), rows),
+              tabulate<DemoError>({.name = "errors", .title = "Error of the picture against rays"},
+                                  demo_error_columns(), errors)}};
 }
 
 }  // namespace

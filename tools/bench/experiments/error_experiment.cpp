@@ -9,7 +9,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kErrorReading[] =
     "The error that was asked for with --error, and the error that was measured. An error is the "
     "larger one of occlusion and irradiance: root mean square (RMS) over the mean, against rays at "
     "the same surfels, at receivers that had no part in choosing the setting. Errors against the "
@@ -23,7 +23,7 @@ std::string setting_text(float solid_angle, float parallax, unsigned resolution)
   return fmt::format("{} sr, {} rad, R {}", solid_angle, parallax, resolution);
 }
 
-const Columns<ErrorRow>& columns() {
+const Columns<ErrorRow>& error_columns() {
   using R = ErrorRow;
   const auto gather = [](auto member) {
     return [member](const R& r) { return r.tuning.gather.*member; };
@@ -121,7 +121,7 @@ Chart chart_of(const std::vector<SceneErrors>& scenes) {
                           .y_label = "RMS error, % of the mean"};
   ChartSeries limit{.name = "asked", .dashed = true};
   Chart chart{.title = "Measured error against the error asked with --error", .columns = 2};
-  chart.note = std::string(kReading) + "\n";
+  chart.note = std::string(kErrorReading) + "\n";
   for (const SceneErrors& scene : scenes) {
     // Show measured against asked, and once the line on which both are equal
     for (const char* set : kSets) {
@@ -161,9 +161,9 @@ Report report_of(const std::vector<SceneErrors>& scenes, unsigned runs) {
   return {
       .name = "error",
       .title = "Measured error against the error asked with --error",
-      .reading = kReading,
+      .reading = kErrorReading,
       .runs = runs,
-      .tables = {tabulate<ErrorRow>({.name = "rows"}, columns(), rows),
+      .tables = {tabulate<ErrorRow>({.name = "rows"}, error_columns(), rows),
                  tabulate<RungRow>({.name = "ladder",
                                     .title = "All settings that --error chooses from",
                                     .group = "scene"},

@@ -11,7 +11,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kFarmReading[] =
     "A city built in one run, and by the tasks of a plan: routes, parts, a join. A smaller city is "
     "also lit by a sun and shaded with two bounces, the first of which is made of all points "
     "before. Workers: threads "
@@ -23,7 +23,7 @@ constexpr char kReading[] =
     "longer. Model s: what it says of this machine. Efficiency: computing of all tasks over "
     "cores times seconds. Limit: what takes longest where nothing else takes time.";
 
-const Columns<FarmRow>& columns() {
+const Columns<FarmRow>& farm_columns() {
   using R = FarmRow;
   static const Columns<R> columns{{"way", {"way"}, &R::way},
                                   {"workers", {"workers"}, &R::workers},
@@ -34,7 +34,7 @@ const Columns<FarmRow>& columns() {
   return columns;
 }
 
-const Columns<FarmModelRow>& model_columns() {
+const Columns<FarmModelRow>& farm_model_columns() {
   using R = FarmModelRow;
   constexpr double kHour = 3600, kTera = 1e12, kMega = 1e6;
   static const Columns<R> columns{
@@ -107,16 +107,16 @@ Report report_of(const FarmResult& result, const FarmBenchOptions& options) {
   return {
       .name = "farm",
       .title = "One scene by many tasks",
-      .reading = kReading,
+      .reading = kFarmReading,
       .runs = options.repeats,
-      .tables = {tabulate<FarmRow>({.name = "rows"}, columns(), result.rows),
+      .tables = {tabulate<FarmRow>({.name = "rows"}, farm_columns(), result.rows),
                  tabulate<TaskCosts>({.name = "costs", .title = "What the tasks took"},
                                      cost_columns(), costs),
-                 tabulate<FarmModelRow>({.name = "nodes", .title = model}, model_columns(),
+                 tabulate<FarmModelRow>({.name = "nodes", .title = model}, farm_model_columns(),
                                         result.by_nodes),
                  tabulate<FarmModelRow>(
                      {.name = "parts", .title = "The same on the most machines, by the plan"},
-                     model_columns(), result.by_parts)},
+                     farm_model_columns(), result.by_parts)},
       .notes = {fmt::format("The model's machines have {} cores and {:.3g} GB/s of net each, the "
                             "file system {:.3g} GB/s for all. A file takes {:.3g} ms to open, the "
                             "scheduler starts {:.3g} tasks a second, and {:.3g} % of the tasks "

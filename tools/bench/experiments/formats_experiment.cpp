@@ -5,7 +5,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kFormatsReading[] =
     "Points of the procedural city with a colour, an intensity, a class and a time, written in "
     "each "
     "format and read again; further files are only read. Reading is what a build does: all values "
@@ -16,7 +16,7 @@ constexpr char kReading[] =
     "coordinate that was written and the one that is read again, in units of 1 m; in a row of a "
     "library that reads, between its coordinates and those that ptcx reads.";
 
-const Columns<FormatRow>& columns() {
+const Columns<FormatRow>& formats_columns() {
   using R = FormatRow;
   static const Columns<R> columns{
       {"file", {"file"}, &R::file},
@@ -44,9 +44,9 @@ const Columns<FormatRow>& columns() {
 Report report_of(const std::vector<FormatRow>& rows, unsigned runs) {
   return {.name = "formats",
           .title = "Reading and writing of point files",
-          .reading = kReading,
+          .reading = kFormatsReading,
           .runs = runs,
-          .tables = {tabulate<FormatRow>({.name = "rows"}, columns(), rows)}};
+          .tables = {tabulate<FormatRow>({.name = "rows"}, formats_columns(), rows)}};
 }
 
 Experiment make_formats_experiment() {

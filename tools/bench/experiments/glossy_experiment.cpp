@@ -7,7 +7,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kGlossyReading[] =
     "Time per receiver for what it would reflect as a rough mirror, against the error. ptcx casts "
     "rays through the octree of the container; embree-discs casts the same rays one at a time at "
     "the same discs in memory, whose tree takes up to 200 bytes a surfel and is built before. "
@@ -16,7 +16,7 @@ constexpr char kReading[] =
     "free of its noise, and its noise stands beside them. Radiance is over the mean radiance, "
     "occlusion absolute.";
 
-const Columns<GlossyRow>& columns() {
+const Columns<GlossyRow>& glossy_columns() {
   using R = GlossyRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -38,7 +38,7 @@ const Columns<GlossyRow>& columns() {
 
 Report report_of(const std::vector<std::vector<GlossyRow>>& scenes, unsigned runs) {
   std::vector<GlossyRow> rows;
-  Chart chart{.title = "Time for a reflection against error", .note = kReading, .columns = 2};
+  Chart chart{.title = "Time for a reflection against error", .note = kGlossyReading, .columns = 2};
   for (const auto& scene : scenes) {
     if (scene.empty()) continue;
     ChartPanel panel{.title = scene.front().scene,
@@ -54,12 +54,13 @@ Report report_of(const std::vector<std::vector<GlossyRow>>& scenes, unsigned run
     add_panel(chart, std::move(panel));
     rows.insert(rows.end(), scene.begin(), scene.end());
   }
-  return {.name = "glossy",
-          .title = "Time for a reflection against error",
-          .reading = kReading,
-          .runs = runs,
-          .tables = {tabulate<GlossyRow>({.name = "rows", .group = "scene"}, columns(), rows)},
-          .figures = {{.chart = chart}}};
+  return {
+      .name = "glossy",
+      .title = "Time for a reflection against error",
+      .reading = kGlossyReading,
+      .runs = runs,
+      .tables = {tabulate<GlossyRow>({.name = "rows", .group = "scene"}, glossy_columns(), rows)},
+      .figures = {{.chart = chart}}};
 }
 
 Experiment make_glossy_experiment() {

@@ -10,7 +10,7 @@ namespace ptc::bench {
 namespace {
 
 constexpr char kTime[] = "CPU time per receiver, \u00b5s";
-constexpr char kReading[] =
+constexpr char kGrowthReading[] =
     "Time per receiver of PTCX, against the number of surfels, the solid angle of the gather, the "
     "sheets that lie behind each other, and the size of the page cache. Receivers are points of "
     "the scene in blocks of neighbours, spread evenly; they get occlusion and irradiance. Errors "
@@ -21,7 +21,7 @@ constexpr char kReading[] =
     "pages; the cache is empty when a run begins, and the file is in the system's cache. Labels in "
     "the charts are the error of irradiance, or the hit rate of the page cache.";
 
-const Columns<GrowthRow>& columns() {
+const Columns<GrowthRow>& growth_columns() {
   using R = GrowthRow;
   static const Columns<R> columns{
       {"panel", {"varied"}, &R::panel},
@@ -78,7 +78,7 @@ ChartPanel cap_panel(const std::vector<GrowthRow>& rows, const char* title, cons
 
 Chart chart_of(const std::vector<GrowthRow>& rows) {
   Chart chart{.title = "Time per receiver against surfels, solid angle, depth and memory",
-              .note = kReading,
+              .note = kGrowthReading,
               .columns = 3};
   add_panel(chart, time_panel(rows, "surfels", "Surfels", "surfels of the city"));
   add_panel(chart, time_panel(rows, "solid-angle", "Solid angle", "solid angle, sr"));
@@ -97,10 +97,10 @@ Chart chart_of(const std::vector<GrowthRow>& rows) {
 Report report_of(const std::vector<GrowthRow>& rows, unsigned runs) {
   return {.name = "growth",
           .title = "Time per receiver against surfels, solid angle, depth and memory",
-          .reading = kReading,
+          .reading = kGrowthReading,
           .runs = runs,
           .tables = {tabulate<GrowthRow>({.name = "rows", .title = "Varied", .group = "panel"},
-                                         columns(), rows)},
+                                         growth_columns(), rows)},
           .figures = {{.chart = chart_of(rows)}}};
 }
 

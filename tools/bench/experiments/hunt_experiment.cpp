@@ -12,7 +12,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kHuntReading[] =
     "Small scenes that are drawn by chance: one to six walls, sheets of two sides, pairs of walls, "
     "wedges, walls with slits, boxes, rooms, balls, discs, leaves and rods, with spacings of up to "
     "16 to 1 beside one another, 250 to 3,500 surfels in all, black, white or coloured, with a sky "
@@ -92,7 +92,7 @@ Table worst_table(const std::vector<Prey>& worst) {
 
 /// The share of scenes whose error is above a value, against that value.
 Chart tail_chart(const Bag& bag) {
-  Chart chart{.title = "Scenes by their errors", .note = kReading, .columns = 1};
+  Chart chart{.title = "Scenes by their errors", .note = kHuntReading, .columns = 1};
   ChartPanel panel{.title = "Share of scenes with a larger error",
                    .x_label = "error, %",
                    .y_label = "share of scenes, %"};
@@ -113,7 +113,7 @@ Chart tail_chart(const Bag& bag) {
 Report report_of(const Bag& bag, const std::vector<KeptRow>& kept) {
   Report report{.name = "hunt",
                 .title = "Scenes drawn by chance",
-                .reading = kReading,
+                .reading = kHuntReading,
                 .runs = 0,
                 .tables = {}};
   report.tables.push_back(spread_table(bag));

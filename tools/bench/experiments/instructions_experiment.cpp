@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kInstructionsReading[] =
     "Shading of points of the procedural city, in blocks of neighbours, on each instruction set in "
     "turn: occlusion and irradiance at the default setting, all pages in memory. Errors are root "
     "mean square (RMS) over the mean of rays at the same discs. The difference is the RMS "
@@ -36,7 +36,7 @@ struct InstructionRow {
   double difference = 0;                         ///< RMS from the best instruction set
 };
 
-const Columns<InstructionRow>& columns() {
+const Columns<InstructionRow>& instructions_columns() {
   using R = InstructionRow;
   static const Columns<R> columns{
       {"instructions", {"instructions"}, &R::instructions},
@@ -118,9 +118,9 @@ Report measure(const InstructionOptions& options, const Bench& bench) {
   }
   return {.name = "instructions",
           .title = "Time per receiver on each instruction set",
-          .reading = kReading,
+          .reading = kInstructionsReading,
           .runs = options.repeats,
-          .tables = {tabulate<InstructionRow>({.name = "rows"}, columns(), rows)}};
+          .tables = {tabulate<InstructionRow>({.name = "rows"}, instructions_columns(), rows)}};
 }
 
 }  // namespace

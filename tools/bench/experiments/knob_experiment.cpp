@@ -12,7 +12,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kKnobReading[] =
     "Whether --error keeps its word. A setting is chosen from several choices of pilots (seeds), "
     "and its error is measured at thousands of other receivers: the largest of those of occlusion, "
     "irradiance and sky, root mean square over the mean, against rays at the same surfels. "
@@ -31,7 +31,7 @@ double middle(const KnobRow& row, const Value& value) {
   return spread_of(std::move(values)).median;
 }
 
-const Columns<KnobRow>& columns() {
+const Columns<KnobRow>& knob_columns() {
   using R = KnobRow;
   const auto over = [](const R& r, bool largest) {
     double result = largest ? 0 : 1e9;
@@ -97,9 +97,9 @@ Chart chart_of(const std::vector<KnobRow>& rows) {
 Report report_of(const std::vector<KnobRow>& rows) {
   return {.name = "knob",
           .title = "Whether --error keeps its word",
-          .reading = kReading,
+          .reading = kKnobReading,
           .runs = 0,
-          .tables = {tabulate<KnobRow>({.name = "rows"}, columns(), rows)},
+          .tables = {tabulate<KnobRow>({.name = "rows"}, knob_columns(), rows)},
           .figures = {{.chart = chart_of(rows)}}};
 }
 

@@ -17,11 +17,11 @@
 namespace ptc::bench {
 namespace {
 
-using Measure = std::function<double(const ModelRow&)>;
+using ModelMeasure = std::function<double(const ModelRow&)>;
 
 constexpr char kTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kError[] = "RMS error, % of the mean";
-constexpr char kReading[] =
+constexpr char kModelReading[] =
     "What each part of the model costs, in bytes and time, and is worth, in error. Errors are root "
     "mean square (RMS) over the mean of the reference. Payload: what a node holds of the areas and "
     "radiance of its surfels; SH n is spherical harmonics up to degree n; receivers are gathered "
@@ -42,7 +42,7 @@ double irradiance(const ModelRow& row) {
   return 100 * row.irradiance.rms;
 }
 
-const Columns<ModelRow>& columns() {
+const Columns<ModelRow>& model_columns() {
   using R = ModelRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -100,7 +100,8 @@ double middle_angle(const SceneModel& scene) {
 }
 
 /// Makes a panel of error over bytes of a node, at the middle solid angle.
-ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const Measure& error) {
+ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what,
+                               const ModelMeasure& error) {
   const double angle = middle_angle(scene);
   ChartPanel panel{.title = fmt::format("Payload at {:.2g} sr: {}", angle, what),
                    .x_label = "bytes per node",
@@ -124,7 +125,8 @@ ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what, const 
 }
 
 /// Makes a panel of error over time, with a line for each payload as stored.
-ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const Measure& error) {
+ChartPanel payloads_over_time(const SceneModel& scene, const char* what,
+                              const ModelMeasure& error) {
   ChartPanel panel{.title = fmt::format("Payload: {}", what), .x_label = kTime, .y_label = kError};
   for (const ModelRow& row : scene.rows) {
     if (row.axis != "payload" || row.form != "stored") continue;
@@ -139,7 +141,7 @@ ChartPanel payloads_over_time(const SceneModel& scene, const char* what, const M
 
 /// Makes a panel of the errors of the gather over a cost of its tree or its pixels.
 ChartPanel gathers_over(const SceneModel& scene, const char* axis, const char* title,
-                        const char* x_label, const Measure& x) {
+                        const char* x_label, const ModelMeasure& x) {
   ChartPanel panel{.title = title, .x_label = x_label, .y_label = kError};
   for (const ModelRow& row : scene.rows) {
     if (row.axis != axis) continue;
@@ -169,7 +171,7 @@ Chart chart_of(const SceneModel& scene) {
   const auto bytes = [](const ModelRow& row) { return row.bytes; };
   const auto time = [](const ModelRow& row) { return row.us.median; };
   Chart chart{.title = "Error against bytes and time of each part of the model: " + scene.scene,
-              .note = std::string(kReading) + "\n" + note_text(scene),
+              .note = std::string(kModelReading) + "\n" + note_text(scene),
               .columns = 4};
   for (ChartPanel& panel : std::vector<ChartPanel>{
            payloads_over_bytes(scene, "irradiance", irradiance),
@@ -192,15 +194,15 @@ Report report_of(const std::vector<SceneModel>& scenes, unsigned runs) {
   std::vector<ModelRow> rows;
   Report report{.name = "model",
                 .title = "Error against bytes and time of each part of the model",
-                .reading = kReading,
+                .reading = kModelReading,
                 .runs = runs};
   for (const SceneModel& scene : scenes) {
     rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
     report.figures.push_back({.part = scene.scene, .chart = chart_of(scene)});
   }
   report.tables = {
-      tabulate<ModelRow>({.name = "rows", .title = "Part of the model", .group = "axis"}, columns(),
-                         rows),
+      tabulate<ModelRow>({.name = "rows", .title = "Part of the model", .group = "axis"},
+                         model_columns(), rows),
       tabulate<SceneModel>({.name = "scenes", .title = "Scenes and references"}, scene_columns(),
                            scenes)};
   return report;

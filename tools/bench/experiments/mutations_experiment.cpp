@@ -37,7 +37,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kMutationsReading[] =
     "Small containers of every profile, with and without channels and light of their own, are "
     "changed in every way of each kind. Found: the verification reports a finding. Accepted: it "
     "reports none. Refused: a reader that loads every page stops with an error; it does not look "
@@ -81,7 +81,7 @@ struct MutationRow {
   }
 };
 
-const Columns<MutationRow>& columns() {
+const Columns<MutationRow>& mutations_columns() {
   using R = MutationRow;
   static const Columns<R> columns{
       {"change", {"change"}, &R::change},    {"tried", {"tried"}, &R::tried},
@@ -340,9 +340,9 @@ MutationRow try_all(const Subject& subject, const Ways& ways, std::size_t every,
 Report report_of(const std::vector<MutationRow>& rows, std::size_t every) {
   Report report{.name = "mutations",
                 .title = "Changes to a file that a verification and a reader detect",
-                .reading = kReading,
+                .reading = kMutationsReading,
                 .runs = 0,
-                .tables = {tabulate<MutationRow>({.name = "rows"}, columns(), rows)}};
+                .tables = {tabulate<MutationRow>({.name = "rows"}, mutations_columns(), rows)}};
   if (every > 1) {
     report.notes = {
         fmt::format("Of kinds with {} ways or more, one way in {} was tried.", kFew, every)};

@@ -7,7 +7,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kRelightReading[] =
     "Time per surfel to light a scene anew, against the error of irradiance. ptclight casts rays "
     "at "
     "the discs of the container, which is larger than the page cache or not, and gathers the sky; "
@@ -19,7 +19,7 @@ constexpr char kReading[] =
     "CPU times are those of rays and gather; wall times of ptclight are those of the whole run, "
     "which writes a container.";
 
-const Columns<RelightRow>& columns() {
+const Columns<RelightRow>& relight_columns() {
   using R = RelightRow;
   static const Columns<R> columns{{"scene", {"scene"}, &R::scene},
                                   {"light", {"light"}, &R::light},
@@ -55,7 +55,8 @@ ChartPanel panel_of(const std::vector<RelightRow>& rows, const std::string& ligh
 
 Report report_of(const std::vector<std::vector<RelightRow>>& scenes, unsigned runs) {
   std::vector<RelightRow> rows;
-  Chart chart{.title = "Time to light a scene anew against error", .note = kReading, .columns = 3};
+  Chart chart{
+      .title = "Time to light a scene anew against error", .note = kRelightReading, .columns = 3};
   for (const auto& scene : scenes) {
     std::string light;
     for (const RelightRow& row : scene) {
@@ -64,12 +65,13 @@ Report report_of(const std::vector<std::vector<RelightRow>>& scenes, unsigned ru
     }
     rows.insert(rows.end(), scene.begin(), scene.end());
   }
-  return {.name = "relight",
-          .title = "Time to light a scene anew against error",
-          .reading = kReading,
-          .runs = runs,
-          .tables = {tabulate<RelightRow>({.name = "rows", .group = "scene"}, columns(), rows)},
-          .figures = {{.chart = chart}}};
+  return {
+      .name = "relight",
+      .title = "Time to light a scene anew against error",
+      .reading = kRelightReading,
+      .runs = runs,
+      .tables = {tabulate<RelightRow>({.name = "rows", .group = "scene"}, relight_columns(), rows)},
+      .figures = {{.chart = chart}}};
 }
 
 Experiment make_relight_experiment() {

@@ -13,7 +13,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kRemoteReading[] =
     "Views of the procedural city, read in ranges as over a network by a reader that keeps nothing "
     "of the file but what it asked for. A row counts all requests since the file was opened. A "
     "round is a set of requests that can be sent together. Outside: the eye is 1.05 diagonals from "
@@ -39,7 +39,7 @@ struct RemoteRow {
   std::uint64_t directory = 0;  ///< bytes of the directory
 };
 
-const Columns<RemoteRow>& columns() {
+const Columns<RemoteRow>& remote_columns() {
   using R = RemoteRow;
   static const Columns<R> columns{
       {"view", {"view"}, &R::view},
@@ -91,12 +91,12 @@ Report measure(const RemoteOptions& options, const Bench& bench) {
   const WorkFile file(bench.work, ".ptcx");
   static_cast<void>(build_container({.city_points = options.points, .run = bench.run}, file.path(),
                                     bench.progress));
-  return {
-      .name = "remote",
-      .title = "Requests and bytes of views that are read in ranges",
-      .reading = kReading,
-      .runs = 1,
-      .tables = {tabulate<RemoteRow>({.name = "rows"}, columns(), rows_of(file.path(), options))}};
+  return {.name = "remote",
+          .title = "Requests and bytes of views that are read in ranges",
+          .reading = kRemoteReading,
+          .runs = 1,
+          .tables = {tabulate<RemoteRow>({.name = "rows"}, remote_columns(),
+                                         rows_of(file.path(), options))}};
 }
 
 }  // namespace

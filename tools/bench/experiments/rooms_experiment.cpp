@@ -9,7 +9,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kRoomsReading[] =
     "Pictures of rooms, built and rendered with the default options and as many bounces as the "
     "command says, beside pictures by path tracing on the mesh, from the same camera with the same "
     "rays through each pixel. Errors are those of pixels that show neither lamps nor sky, over the "
@@ -25,7 +25,7 @@ constexpr char kReading[] =
     "shares with the renderer what a ray meets (Embree, interpolated normals, textures), the "
     "camera, and the radiance of the sky. Times are wall times of one run.";
 
-const Columns<RoomRow>& columns() {
+const Columns<RoomRow>& rooms_columns() {
   using R = RoomRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -45,7 +45,7 @@ const Columns<RoomRow>& columns() {
 }
 
 /// The options that are parsed to more than one value each.
-struct Parsed {
+struct RoomsParsed {
   CameraArguments camera;
   LightArguments lights;
 };
@@ -55,7 +55,7 @@ struct Parsed {
 Report report_of(const std::vector<Room>& rooms, unsigned runs) {
   Report report{.name = "rooms",
                 .title = "Pictures of rooms beside path tracing",
-                .reading = kReading,
+                .reading = kRoomsReading,
                 .runs = runs,
                 .tables = {}};
   std::vector<RoomRow> rows;
@@ -68,13 +68,13 @@ Report report_of(const std::vector<Room>& rooms, unsigned runs) {
                                 room.row.scene),
          .image = room.sheet});
   }
-  report.tables.push_back(tabulate<RoomRow>({.name = "rows"}, columns(), rows));
+  report.tables.push_back(tabulate<RoomRow>({.name = "rows"}, rooms_columns(), rows));
   return report;
 }
 
 Experiment make_rooms_experiment() {
   const auto options = std::make_shared<RoomsOptions>();
-  const auto parsed = std::make_shared<Parsed>();
+  const auto parsed = std::make_shared<RoomsParsed>();
   const auto scenes =
       std::make_shared<SceneList>(std::vector<std::string>{"cornell", "box-lamp", "window"});
   const auto declare = [=](Declaration& d) {

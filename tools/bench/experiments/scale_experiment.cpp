@@ -12,7 +12,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kScaleReading[] =
     "The procedural city at growing sizes under one memory cap. Stages: build generates, sorts and "
     "builds the city into a container; verify reads and checks every byte of it (level 2); shade "
     "computes occlusion and irradiance of some of its points, evenly spread. Verify and shade "
@@ -166,7 +166,7 @@ Chart chart_of(const std::vector<ScaleRow>& rows) {
     add_point(bytes, "container", false, row, per_point(row.file_bytes, row));
   }
   return {.title = "From a procedural city to shaded receivers at growing sizes",
-          .note = kReading,
+          .note = kScaleReading,
           .panels = {time, shade, memory, bytes},
           .columns = 2};
 }
@@ -182,7 +182,7 @@ Report report_of(const std::vector<ScaleRow>& rows, unsigned runs) {
   return {
       .name = "scale",
       .title = "From a procedural city to shaded receivers at growing sizes",
-      .reading = kReading,
+      .reading = kScaleReading,
       .runs = runs,
       .tables = {tabulate<ScaleRow>({.name = "rows"}, columns_of(rows), rows),
                  tabulate<ScaleLaw>(

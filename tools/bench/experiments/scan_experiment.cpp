@@ -7,7 +7,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kScanReading[] =
     "Points drawn at random from a mesh, without normals and radii, and with Gaussian noise along "
     "each axis, in units of the spacing sqrt(area / points). Angles are between a normal and the "
     "line along the normal of the triangle from which the point was drawn; flipped normals point "
@@ -19,7 +19,7 @@ constexpr char kReading[] =
     "over that of the mesh. The result of ptcx was checked to have the same bytes under another "
     "cap and with another number of threads.";
 
-const Columns<ScanRow>& columns() {
+const Columns<ScanRow>& scan_columns() {
   using R = ScanRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -44,7 +44,7 @@ const Columns<ScanRow>& columns() {
 }
 
 Chart chart_of(const std::vector<ScanRow>& rows) {
-  Chart chart{.title = "Normals of point clouds", .note = kReading, .columns = 2};
+  Chart chart{.title = "Normals of point clouds", .note = kScanReading, .columns = 2};
   for (const bool noisy : {false, true}) {
     ChartPanel panel{.title = noisy ? "With noise" : "Without noise",
                      .x_label = "CPU time per point, \u00b5s",
@@ -70,9 +70,9 @@ Report report_of(const std::vector<SceneScans>& scenes, unsigned runs) {
   }
   return {.name = "scan",
           .title = "Normals and radii of point clouds",
-          .reading = kReading,
+          .reading = kScanReading,
           .runs = runs,
-          .tables = {tabulate<ScanRow>({.name = "rows"}, columns(), rows)},
+          .tables = {tabulate<ScanRow>({.name = "rows"}, scan_columns(), rows)},
           .notes = notes,
           .figures = {{.chart = chart_of(rows)}}};
 }

@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kSortReading[] =
     "Point records of 40 bytes in several orders of their keys. In memory: CPU time of all threads "
     "together; ptcx is the core of the external sort, tbb is oneTBB's parallel_sort, which like "
     "std::sort is not stable. On disk: wall time from an input file of records to an output file, "
@@ -96,11 +96,11 @@ ChartPanel panel_of(const std::vector<SortRow>& rows, const std::string& name) {
 
 Report report_of(const std::vector<SortRow>& rows, unsigned runs) {
   Chart chart{
-      .title = "Sorting point records in memory and on disk", .note = kReading, .columns = 2};
+      .title = "Sorting point records in memory and on disk", .note = kSortReading, .columns = 2};
   for (const char* name : kSortPanels) add_panel(chart, panel_of(rows, name));
   return {.name = "sort",
           .title = "Sorting point records in memory and on disk",
-          .reading = kReading,
+          .reading = kSortReading,
           .runs = runs,
           .tables = {tabulate<SortRow>(
               {.name = "rows", .title = "Place of the records", .group = "panel"}, columns_of(rows),

@@ -5,7 +5,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kSpecksReading[] =
     "Points drawn at random from a mesh, without normals and radii, are built and shaded as "
     "ptcshade "
     "does by default. Their occlusion is compared with that of rays at the mesh, from the place "
@@ -20,7 +20,7 @@ constexpr char kReading[] =
     "a "
     "farther surface. Wall times are of one run.";
 
-const Columns<SpecksRow>& columns() {
+const Columns<SpecksRow>& specks_columns() {
   using R = SpecksRow;
   static const Columns<R> columns{{"scene", {"scene"}, &R::scene},
                                   {"cloud", {"cloud"}, &R::cloud},
@@ -43,9 +43,9 @@ Report report_of(const std::vector<std::vector<SpecksRow>>& scenes, unsigned run
   for (const auto& scene : scenes) rows.insert(rows.end(), scene.begin(), scene.end());
   return {.name = "specks",
           .title = "Occlusion at the points of scans",
-          .reading = kReading,
+          .reading = kSpecksReading,
           .runs = runs,
-          .tables = {tabulate<SpecksRow>({.name = "rows"}, columns(), rows)}};
+          .tables = {tabulate<SpecksRow>({.name = "rows"}, specks_columns(), rows)}};
 }
 
 Experiment make_specks_experiment() {

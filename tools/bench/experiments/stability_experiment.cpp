@@ -15,7 +15,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kStabilityReading[] =
     "Small scenes in which this method, or others like it, fail, shaded with the default settings. "
     "Beside each stands an answer that shares no code with the gather: a formula, exact discs, or "
     "rays at the discs or at the mesh. 0 would be right everywhere. What is shown is light over pi "
@@ -34,7 +34,7 @@ struct Line {
   std::optional<double> flip;
 };
 
-const Columns<Line>& columns() {
+const Columns<Line>& stability_columns() {
   using L = Line;
   const auto shown = [](double Bounded::*member) {
     return [member](const L& line) {
@@ -73,10 +73,10 @@ Image panel_of(const Field& field, double& error) {
 Report report_of(const std::vector<Line>& lines, const std::vector<Image>& panels) {
   Report report{.name = "stability",
                 .title = "Where the method fails",
-                .reading = kReading,
+                .reading = kStabilityReading,
                 .runs = 0,
                 .tables = {}};
-  report.tables.push_back(tabulate<Line>({.name = "rows"}, columns(), lines));
+  report.tables.push_back(tabulate<Line>({.name = "rows"}, stability_columns(), lines));
   report.sheets.push_back(
       {.part = "sheet",
        .caption =

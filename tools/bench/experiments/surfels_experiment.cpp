@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kSurfelsReading[] =
     "How near surfels come to the mesh that they were made of, by their number, evenly spread and "
     "adapted to the surface (--adapt). Errors are root mean square over the mean, of rays at the "
     "surfels against rays at the mesh along the same directions, at 2,048 places of the mesh: of "
@@ -24,7 +24,7 @@ const char* way_of(bool adapts) {
   return adapts ? "adapted" : "even";
 }
 
-const Columns<SurfelsRow>& columns() {
+const Columns<SurfelsRow>& surfels_columns() {
   using R = SurfelsRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -106,9 +106,9 @@ Report report_of(const std::vector<SurfelsScene>& scenes, unsigned runs) {
   }
   return {.name = "surfels",
           .title = "How many surfels a mesh needs",
-          .reading = kReading,
+          .reading = kSurfelsReading,
           .runs = runs,
-          .tables = {tabulate<SurfelsRow>({.name = "rows"}, columns(), rows),
+          .tables = {tabulate<SurfelsRow>({.name = "rows"}, surfels_columns(), rows),
                      tabulate<SurfelsNeeds>({.name = "needs"}, need_columns(), needs)},
           .figures = {{.chart = chart}}};
 }

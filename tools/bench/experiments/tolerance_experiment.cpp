@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kToleranceReading[] =
     "What --tolerance saves of the bytes of a container. The first row of a scene is the profile "
     "compact; bytes are for each point of the exact container. Errors are root mean square over "
     "the mean, at 2,048 points: of occlusion or light that arrives, whichever is larger, by rays "
@@ -19,7 +19,7 @@ constexpr char kReading[] =
     "CPU time of the gather, with default settings, of the same receivers from each container: "
     "median, least and greatest. Choosing is the time of all trials.";
 
-const Columns<ToleranceRow>& columns() {
+const Columns<ToleranceRow>& tolerance_columns() {
   using R = ToleranceRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, &R::scene},
@@ -64,9 +64,9 @@ Report report_of(const std::vector<ToleranceScene>& scenes, unsigned runs) {
   add_panel(chart, times);
   return {.name = "tolerance",
           .title = "Fewer bytes within a tolerance",
-          .reading = kReading,
+          .reading = kToleranceReading,
           .runs = runs,
-          .tables = {tabulate<ToleranceRow>({.name = "rows"}, columns(), rows)},
+          .tables = {tabulate<ToleranceRow>({.name = "rows"}, tolerance_columns(), rows)},
           .figures = {{.chart = chart}}};
 }
 

@@ -10,7 +10,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kTruthReading[] =
     "Pictures of scenes with 1, 2, 4 ... bounces of light, built and rendered with the default "
     "options, beside pictures by a path tracer with as many paths a pixel as the command says: "
     "Mitsuba 3, which shares no code with this project and gets the same triangles, materials, "
@@ -24,10 +24,8 @@ constexpr char kReading[] =
     "shadows in all figures differ by that alone; our own paths take the same rays. Times are wall "
     "times of one run on all cores.";
 
-/// One line of the table.
-using R = TruthRow;
-
-const Columns<R>& columns() {
+const Columns<TruthRow>& truth_columns() {
+  using R = TruthRow;
   static const Columns<R> columns{
       {"scene", {"scene"}, path(&R::errors, &RoomRow::scene)},
       {"judge", {"beside"}, &R::judge},
@@ -50,7 +48,7 @@ const Columns<R>& columns() {
 }
 
 /// The options that are parsed to more than one value each.
-struct Parsed {
+struct TruthParsed {
   CameraArguments camera;
   LightArguments lights;
 };
@@ -60,10 +58,10 @@ struct Parsed {
 Report report_of(const std::vector<Truth>& scenes, unsigned runs) {
   Report report{.name = "truth",
                 .title = "Pictures of several bounces beside a path tracer from outside",
-                .reading = kReading,
+                .reading = kTruthReading,
                 .runs = runs,
                 .tables = {}};
-  std::vector<R> rows;
+  std::vector<TruthRow> rows;
   for (const Truth& scene : scenes) {
     rows.insert(rows.end(), scene.rows.begin(), scene.rows.end());
     report.sheets.push_back(
@@ -74,13 +72,13 @@ Report report_of(const std::vector<Truth>& scenes, unsigned runs) {
                          scene.scene, scene.rows.back().bounces, scene.rows.back().judge),
          .image = scene.sheet});
   }
-  report.tables.push_back(tabulate<R>({.name = "rows"}, columns(), rows));
+  report.tables.push_back(tabulate<TruthRow>({.name = "rows"}, truth_columns(), rows));
   return report;
 }
 
 Experiment make_truth_experiment() {
   const auto options = std::make_shared<TruthOptions>();
-  const auto parsed = std::make_shared<Parsed>();
+  const auto parsed = std::make_shared<TruthParsed>();
   const auto scenes =
       std::make_shared<SceneList>(std::vector<std::string>{"cornell", "ajar", "window"});
   const auto declare = [=](Declaration& d) {

@@ -18,7 +18,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kReading[] =
+constexpr char kVerifyReading[] =
     "Verification of a sound container of the procedural city at each level: 0 checks header and "
     "superblocks, 1 also directory and page headers, 2 also the checksum of every byte, 3 also the "
     "content of pages and every node against its points, 4 also builds the tree again and compares "
@@ -45,7 +45,7 @@ struct VerifyRow {
   std::uint64_t resident_bytes = 0;
 };
 
-const Columns<VerifyRow>& columns() {
+const Columns<VerifyRow>& verify_columns() {
   using R = VerifyRow;
   static const Columns<R> columns{
       {"work", {"work"}, &R::work},
@@ -144,9 +144,9 @@ Report measure(const VerifyBenchOptions& options, const Bench& bench) {
   for (const VerifyRun& run : runs) rows.push_back(run.row(container));
   return {.name = "verify",
           .title = "Time and memory of a verification at each level",
-          .reading = kReading,
+          .reading = kVerifyReading,
           .runs = options.repeats,
-          .tables = {tabulate<VerifyRow>({.name = "rows"}, columns(), rows)}};
+          .tables = {tabulate<VerifyRow>({.name = "rows"}, verify_columns(), rows)}};
 }
 
 }  // namespace

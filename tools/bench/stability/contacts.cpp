@@ -266,7 +266,7 @@ Outcome coplanar(const Lab& lab) {
       .field = {kWidth, kHeight, ours, truth}};
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kContactRows = std::to_array<Row>({
     {"1", "floor beside a wall", "blotches at the crease", crease},
     {"1", "wedges of 20 to 150 degrees", "blotches at the crease", wedges},
     {"2", "closed wedges of 6 to 34 degrees under a sky", "light in the crease", closed_wedges},
@@ -281,7 +281,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_contacts() {
-  return kRows;
+  return kContactRows;
 }
 
 }  // namespace ptc::bench

@@ -25,8 +25,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kSide = 32;
-
 /// A ball above a floor.
 std::vector<Surfel> ball_on_floor(double spacing) {
   std::vector<Surfel> surfels;
@@ -35,7 +33,7 @@ std::vector<Surfel> ball_on_floor(double spacing) {
   return surfels;
 }
 
-std::vector<Receiver> floor_receivers(double lift) {
+std::vector<Receiver> receivers_below_ball(double lift) {
   return receivers_on_grid(kSide, kSide, [&](double u, double v) {
     return Receiver{{2 * u - 1, 2 * v - 1, lift}, {0, 0, 1}};
   });
@@ -47,7 +45,7 @@ template <class Change>
 Field changed(const Lab& lab, const Change& change) {
   constexpr double kSpacing = 0.04;
   std::vector<Surfel> surfels = ball_on_floor(kSpacing);
-  const auto receivers = floor_receivers(0.1 * kSpacing);
+  const auto receivers = receivers_below_ball(0.1 * kSpacing);
   Field field{.width = kSide, .height = kSide};
   field.truth = values(SmallScene(lab, surfels).shade(receivers), brightness);
   Random random(18);
@@ -100,7 +98,7 @@ Outcome degenerate_points(const Lab& lab) {
   Progress silent;
   build_container(request, built.path(), silent);
   const ContainerReader container(built.path());
-  const auto receivers = floor_receivers(0.1 * kSpacing);
+  const auto receivers = receivers_below_ball(0.1 * kSpacing);
   std::vector<Shading> shaded(receivers.size());
   Shader(container, {.cache_bytes = 64U << 20}, lab.executor).shade(receivers, shaded, silent);
   Field field{kSide, kSide, values(shaded, brightness),
@@ -149,7 +147,7 @@ Outcome coincident(const Lab& lab) {
 /// A scene that is moved, scaled, and whose points come in another order.
 Outcome moved(const Lab& lab) {
   constexpr double kSpacing = 0.04;
-  const auto receivers = floor_receivers(0.1 * kSpacing);
+  const auto receivers = receivers_below_ball(0.1 * kSpacing);
   const std::vector<Surfel> surfels = ball_on_floor(kSpacing);
   const auto truth = values(SmallScene(lab, surfels).shade(receivers), brightness);
   const auto shade = [&](double scale, const glm::dvec3& offset, bool reversed) {
@@ -271,7 +269,7 @@ Outcome one_pixel_sun(const Lab& lab) {
           .field = {kSide, kSide, ours, truth}};
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kInputRows = std::to_array<Row>({
     {"18", "cloud with points without normal or size", "values that are no numbers",
      degenerate_points},
     {"18", "normals with noise, and turned over", "light that is lost", noisy_normals},
@@ -287,7 +285,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_inputs() {
-  return kRows;
+  return kInputRows;
 }
 
 }  // namespace ptc::bench

@@ -20,6 +20,10 @@
 
 namespace ptc::bench {
 
+constexpr unsigned kSide = 32;          ///< receivers along the side of a square of them
+constexpr unsigned kFrames = 100;       ///< of what moves
+constexpr double kAllowedStep = 0.005;  ///< of white, beyond one and a half of a true step
+
 /// Where rows are measured.
 struct Lab {
   std::filesystem::path work;  ///< directory for containers, which have no name there once open

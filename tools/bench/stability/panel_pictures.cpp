@@ -17,7 +17,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kSide = 2;  // samples along the side of a pixel, as RenderRequest has it
+constexpr unsigned kSamplesAlong = 2;  // samples along the side of a pixel, as RenderRequest has it
 
 /// Returns a mesh that emits what the panels shine, and reflects nothing.
 std::shared_ptr<const Mesh> shining_mesh(std::span<const Panel> panels) {
@@ -85,12 +85,13 @@ TruePicture true_picture(const Lab& lab, const RayScene& rays, std::span<const P
                       .panel = std::vector(pixels, -1),
                       .place = std::vector(pixels, glm::dvec3(0))};
   lab.executor.for_each(pixels, [&](std::size_t pixel, unsigned) {
-    for (unsigned sample = 0; sample < kSide * kSide; ++sample) {
+    for (unsigned sample = 0; sample < kSamplesAlong * kSamplesAlong; ++sample) {
       const auto at = [&](std::size_t index, unsigned shift) {
-        return static_cast<float>(index) + (static_cast<float>(shift) + 0.5F) / kSide;
+        return static_cast<float>(index) + (static_cast<float>(shift) + 0.5F) / kSamplesAlong;
       };
-      const glm::vec3 direction = camera.direction(at(pixel % camera.width, sample % kSide),
-                                                   at(pixel / camera.width, sample / kSide));
+      const glm::vec3 direction =
+          camera.direction(at(pixel % camera.width, sample % kSamplesAlong),
+                           at(pixel / camera.width, sample / kSamplesAlong));
       const auto hit =
           rays.closest(camera.position, direction, 0, std::numeric_limits<double>::infinity());
       const int seen = hit ? static_cast<int>(hit->triangle / 2) : -1;
@@ -105,7 +106,7 @@ TruePicture true_picture(const Lab& lab, const RayScene& rays, std::span<const P
       picture.clearance[pixel] =
           std::min(picture.clearance[pixel], distance_to_walls(receiver, panels) / spacing);
     }
-    picture.light[pixel] /= static_cast<float>(kSide * kSide);
+    picture.light[pixel] /= static_cast<float>(kSamplesAlong * kSamplesAlong);
   });
   return picture;
 }

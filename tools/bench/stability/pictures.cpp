@@ -28,10 +28,8 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kFrames = 100;
-constexpr double kSpacing = 0.04;
-constexpr double kAllowed = 0.005;  // of white, beyond one and a half of the true step
-constexpr double kClear = 0.5;      // spacings from a wall, from which on a pixel is clear of it
+constexpr double kPictureSpacing = 0.04;
+constexpr double kClear = 0.5;  // spacings from a wall, from which on a pixel is clear of it
 
 /// A floor with a wall, a block, a pole, a thin post and a table.
 /// @param scale  of all radiance
@@ -89,8 +87,8 @@ struct Frames {
 struct Flicker {
   double largest = 0;        ///< step of a pixel beyond 1.5 of the true one
   double largest_clear = 0;  ///< the same where no wall is within kClear
-  double share = 0;          ///< share of the pixels of all frames whose step is beyond kAllowed
-  unsigned row = 0;          ///< of the pixel of the largest one
+  double share = 0;  ///< share of the pixels of all frames whose step is beyond kAllowedStep
+  unsigned row = 0;  ///< of the pixel of the largest one
 };
 
 Flicker flicker_of(const Frames& frames) {
@@ -104,7 +102,7 @@ Flicker flicker_of(const Frames& frames) {
                       true_step = glm::abs(now.light[i] - before.light[i]),
                       excess = step - 1.5F * true_step;
       const double most = std::max({excess.r, excess.g, excess.b});
-      beyond += most > kAllowed ? 1 : 0;
+      beyond += most > kAllowedStep ? 1 : 0;
       if (most > found.largest) {
         found.largest = most;
         found.row = static_cast<unsigned>(i / frames.width);
@@ -140,7 +138,7 @@ struct MotionBounds {
 };
 
 /// Sums frames up. The field is a slice through them, along the row of the largest step.
-Outcome finished(const Frames& frames, const MotionBounds& bounds) {
+Outcome finished_pictures(const Frames& frames, const MotionBounds& bounds) {
   const Flicker flicker = flicker_of(frames);
   Field slice{.width = frames.width, .height = static_cast<unsigned>(frames.ours.size())};
   double square = 0;
@@ -172,18 +170,19 @@ Frames fly(const PanelPictures& pictures, Camera (*camera)(unsigned), unsigned c
 }
 
 Outcome along_the_floor(const Lab& lab) {
-  const PanelPictures pictures(lab, furniture(1), kSpacing, glm::vec3(1));
-  return finished(fly(pictures, grazing_camera), {0.025, 0.0125, 0.002, 0.004, 0.0035});
+  const PanelPictures pictures(lab, furniture(1), kPictureSpacing, glm::vec3(1));
+  return finished_pictures(fly(pictures, grazing_camera), {0.025, 0.0125, 0.002, 0.004, 0.0035});
 }
 
 Outcome at_contacts(const Lab& lab) {
-  const PanelPictures pictures(lab, furniture(1), kSpacing, glm::vec3(1));
-  return finished(fly(pictures, close_camera), {0.025, 0.0125, 0.002, 0.004, 0.0035});
+  const PanelPictures pictures(lab, furniture(1), kPictureSpacing, glm::vec3(1));
+  return finished_pictures(fly(pictures, close_camera), {0.025, 0.0125, 0.002, 0.004, 0.0035});
 }
 
 Outcome with_lamp(const Lab& lab) {
-  const PanelPictures pictures(lab, furniture_with_lamp(), kSpacing, glm::vec3(0));
-  return finished(fly(pictures, grazing_camera, kFrames / 2), {0.07, 0.07, 0.45, 0.015, 0.015});
+  const PanelPictures pictures(lab, furniture_with_lamp(), kPictureSpacing, glm::vec3(0));
+  return finished_pictures(fly(pictures, grazing_camera, kFrames / 2),
+                           {0.07, 0.07, 0.45, 0.015, 0.015});
 }
 
 /// Writes panels as an OBJ file.
@@ -268,10 +267,10 @@ Outcome sliding_block(const Lab& lab) {
     for (glm::vec3& light : ours) light *= 2;  // surfaces reflect half of it
     frames.add(std::move(ours), std::move(truth));
   }
-  return finished(frames, {0.04, 0.01, 0.002, 0.003, 0.004});
+  return finished_pictures(frames, {0.04, 0.01, 0.002, 0.003, 0.004});
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kPictureRows = std::to_array<Row>({
     {"15", "camera along a floor with furniture, under a sky", "pixels that flicker",
      along_the_floor},
     {"15", "camera close to where they touch the floor", "pixels that flicker", at_contacts},
@@ -282,7 +281,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_pictures() {
-  return kRows;
+  return kPictureRows;
 }
 
 }  // namespace ptc::bench

@@ -19,8 +19,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kSide = 32;
-
 /// Receivers on the floor of small_scene(). @param lift  above it
 std::vector<Receiver> floor_receivers(unsigned side, double lift) {
   return receivers_on_grid(side, side, [&](double u, double v) {
@@ -334,7 +332,7 @@ Outcome grazing(const Lab& lab) {
           .field = {kSide, kSide, ours, truth}};
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kPixelRows = std::to_array<Row>({
     {"3", "lone planes of any tilt and scale", "surfaces that shade themselves", lone_plane},
     {"4", "single discs all around a receiver", "dark blotches of discs behind it", random_discs},
     {"5", "scene turned in eight ways", "light that depends on the turn", turned},
@@ -352,7 +350,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_pixels() {
-  return kRows;
+  return kPixelRows;
 }
 
 }  // namespace ptc::bench

@@ -22,7 +22,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr double kSpacing = 0.04;
+constexpr double kSeamSpacing = 0.04;
 constexpr float kContrast = 8;  // by which differences are multiplied to look for seams
 
 /// Returns a camera of pictures wider than a tile, in a scene whose z points up.
@@ -88,7 +88,7 @@ bool parts_cells(const Frame& frame, const glm::dvec3& a, const glm::dvec3& b) {
 }
 
 Outcome seams(const Lab& lab, const std::vector<Panel>& panels, const Camera& camera) {
-  const PanelPictures pictures(lab, panels, kSpacing, glm::vec3(1));
+  const PanelPictures pictures(lab, panels, kSeamSpacing, glm::vec3(1));
   const std::vector<glm::vec3> ours = pictures.render(camera);
   const TruePicture truth = pictures.truth(camera);
   const unsigned tile = TileRenderer::tile_of(camera.width, 2).width;
@@ -144,7 +144,7 @@ Outcome seams_of_room(const Lab& lab) {
                camera);
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kSeamRows = std::to_array<Row>({
     {"29", "floor before a wall, contrast times eight", "seams", seams_of_floor},
     {"29", "room with one side open, contrast times eight", "seams", seams_of_room},
 });
@@ -152,7 +152,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_seams() {
-  return kRows;
+  return kSeamRows;
 }
 
 }  // namespace ptc::bench

@@ -18,8 +18,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kSide = 32;
-
 /// Adds true values: half of the rows white, the other half black.
 void add_white_and_black(unsigned rows, Field& field) {
   for (const double light : {1.0, 0.0}) {
@@ -252,7 +250,7 @@ Outcome foliage(const Lab& lab) {
           .field = {kSide, kSide, ours, truth}};
 }
 
-constexpr std::array kRows = std::to_array<Row>({
+constexpr std::array kWallRows = std::to_array<Row>({
     {"7", "closed ball from within", "gaps between discs", closed_ball},
     {"11", "bright sheet of one side from behind", "light through the back", behind_a_sheet},
     {"11", "walls of two sides, turned", "the light of one side on the other", two_sides},
@@ -265,7 +263,7 @@ constexpr std::array kRows = std::to_array<Row>({
 }  // namespace
 
 std::span<const Row> rows_of_walls() {
-  return kRows;
+  return kWallRows;
 }
 
 }  // namespace ptc::bench
