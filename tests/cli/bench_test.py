@@ -28,8 +28,8 @@ class Bench(ProgramTest):
         # Two settings of PTCX; rays and the plain gather are timed as always.
         charts = self.here / "charts"
         settings = ["--setting", "0.06,0.3,32", "--setting", "0.005,0.07,32"]
-        printed = self.succeed("ptcbench", "accuracy", "fractal", "--quick", "--points", "20k", "--checked", "30",
-                               "--repeats", "1", "--reference-rays", "8192", *settings, "-o", charts, "--json")
+        printed = self.succeed("ptcbench", "accuracy", "fractal", "--quick", "--points", "20k", "--checked", "20",
+                               "--repeats", "1", "--reference-rays", "4096", *settings, "-o", charts, "--json")
         facts = json.loads((charts / "accuracy.json").read_text())
         self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
         for place in ("camera", "points", "sparse"):
@@ -72,7 +72,7 @@ class Bench(ProgramTest):
 
     def test_errors_that_were_asked_for_are_met(self):
         charts = self.here / "charts"
-        printed = self.succeed("ptcbench", "error", "fractal", "--quick", "--points", "10k", "--checked", "100", "-o", charts,
+        printed = self.succeed("ptcbench", "error", "fractal", "--quick", "--points", "5k", "--checked", "50", "-o", charts,
                                "--json")
         facts = json.loads((charts / "error.json").read_text())
         self.assertEqual(json.loads(printed.stdout)["rows"], facts["rows"])
@@ -112,7 +112,7 @@ class Bench(ProgramTest):
 
     def test_growth_measures_every_panel_and_leaves_its_files_alone(self):
         charts = self.here / "charts"
-        printed = self.succeed("ptcbench", "growth", "--quick", "--points", "4k", "--points", "8k", "--checked", "10",
+        printed = self.succeed("ptcbench", "growth", "--quick", "--points", "2k", "--points", "4k", "--checked", "10",
                                "--repeats", "1", "--threads", "2", "-o", charts, "--json")
         rows = json.loads((charts / "growth.json").read_text())["rows"]
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
@@ -213,7 +213,7 @@ class Bench(ProgramTest):
 
     def test_pictures_of_rooms_are_compared_with_paths(self):
         charts, pictures = self.here / "charts", self.here / "pictures"
-        self.succeed("ptcbench", "rooms", "cornell", "box-lamp", "--quick", "--points", "20k", "--pictures", pictures, "-o", charts)
+        self.succeed("ptcbench", "rooms", "cornell", "box-lamp", "--quick", "--points", "10k", "--pictures", pictures, "-o", charts)
         rows = json.loads((charts / "rooms.json").read_text())["rows"]
         self.assertEqual([r["scene"] for r in rows], ["cornell", "box-lamp"])
         for row in rows:
@@ -329,7 +329,7 @@ class Bench(ProgramTest):
 
     def test_caches_answer_alike_and_leave_their_files_alone(self):
         charts = self.here / "charts"
-        printed = self.succeed("ptcbench", "cache", "--quick", "--points", "120k", "--receivers", "1024", "--repeats", "1", "--threads", "1",
+        printed = self.succeed("ptcbench", "cache", "--quick", "--points", "60k", "--receivers", "1024", "--repeats", "1", "--threads", "1",
                                "-o", charts, "--json")
         rows = json.loads((charts / "cache.json").read_text())["rows"]
         self.assertEqual(json.loads(printed.stdout)["rows"], rows)
