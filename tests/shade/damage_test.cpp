@@ -60,22 +60,25 @@ struct Damaged {
     broken = std::make_unique<ContainerReader>(scene.dir / "broken.ptcx");
   }
 
-  /// Shades every step-th receiver by itself, which gives each a bound of its own.
-  [[nodiscard]] std::vector<Pair> shade_alone(std::size_t step, LostPages& lost) const {
+  /// Shades every step-th receiver by itself, which gives each a bound of its own, or with its
+  /// neighbours, whose bound is that of them all.
+  [[nodiscard]] std::vector<Pair> shade_alone(std::size_t step, LostPages& lost,
+                                              std::size_t together = 1,
+                                              const GatherOptions& options = {}) const {
     const SceneView whole(*scene.container), view(*broken, &lost);
     PageCache whole_cache(*scene.container, {.memory_bytes = 64U << 20}),
         cache(*broken, {.memory_bytes = 64U << 20});
     const DirectionGrid grid(GatherOptions().resolution, {}, 0);
-    Gather reference(whole, whole_cache, {});
+    Gather reference(whole, whole_cache, options);
     std::vector<Pair> pairs;
-    for (std::size_t i = 0; i < scene.receivers.size(); i += step) {
-      const std::span<const Receiver> alone(&scene.receivers[i], 1);
-      Pair pair;
-      reference.shade(alone, std::span(&pair.expected, 1), grid);
-      Gather gather(view, cache, {});
-      gather.shade(alone, std::span(&pair.found, 1), grid);
-      pair.bound = gather.counts().damage.max_bound;
-      pairs.push_back(pair);
+    for (std::size_t i = 0; i + together <= scene.receivers.size(); i += step) {
+      const auto some = std::span(scene.receivers).subspan(i, together);
+      std::vector<Shading> expected(together), found(together);
+      reference.shade(some, expected, grid);
+      Gather gather(view, cache, options);
+      gather.shade(some, found, grid);
+      for (std::size_t k = 0; k < together; ++k)
+        pairs.push_back({expected[k], found[k], gather.counts().damage.max_bound});
     }
     return pairs;
   }
@@ -141,11 +144,15 @@ TEST_CASE("damage: stand-ins change no receiver by more than its bound", "[shade
       {nodes[nodes.size() / 2]},
       {nodes.front(), nodes[1]},
       {points[20], points[21], points[22], nodes[3]}};
+  // Alone, and in cells that leave clusters unopened
+  const bool full = GENERATE(false, true);
+  const std::size_t step = full ? 56 : 7, together = full ? 8 : 1;
+  const GatherOptions options = full ? GatherOptions{.things_left = kFewLeft} : GatherOptions{};
   std::size_t changed = 0, tight = 0;
   for (const auto& pages : trials) {
     damaged.break_pages(pages);
     LostPages lost(*damaged.broken);
-    for (const Pair& pair : damaged.shade_alone(7, lost)) {
+    for (const Pair& pair : damaged.shade_alone(step, lost, together, options)) {
       changed += pair.off() > 0.01;
       tight += pair.bound < 0.1;
       if (pair.off() > pair.bound + 0.01)

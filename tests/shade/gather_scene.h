@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -11,6 +12,9 @@
 #include "tests/support/scenes.h"
 
 namespace ptc::test {
+
+/// GatherOptions::things_left for small scenes: so few that most cells leave clusters unopened.
+inline constexpr std::uint32_t kFewLeft = 40;
 
 /// A container of surfels, its reader, and receivers.
 struct Scene {

@@ -20,13 +20,6 @@
 namespace ptc {
 namespace {
 
-// A cell that has left more things than this leaves near clusters unopened to its children. Without
-// the limit, a cell of receivers that lie far apart leaves all surfels between them. A lower one
-// costs time: what a cell does not open is opened in several of its children (spec/notes/lists.md).
-constexpr std::size_t kManyLeft = 24576;
-// One that has left more than this leaves all clusters that it would open.
-constexpr std::size_t kMostLeft = 3 * kManyLeft / 2;
-
 // Calls `body` with the receivers of each occupied child of the smallest octree cell that holds
 // them all. Coincident receivers are handed over one by one.
 template <class Body>
@@ -227,10 +220,14 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
     own.draw(*grid_, queue_, options_.sides, static_cast<unsigned>(depth), horizon);
     queue_.size = 0;
   };
+  // Without a limit, a cell of receivers that lie far apart leaves all surfels between them. A low
+  // one costs time: what a cell does not open is opened in several of the cells within. One that
+  // has left half as much again leaves all clusters that it would open
   const auto kept_within = [&] {
     const std::size_t things = left ? left->size() + opened_.size() : 0;
-    if (things > kMostLeft) return std::numeric_limits<float>::infinity();
-    return things > kManyLeft ? test.shared_from : 0;
+    const std::size_t many = options_.things_left;
+    if (things > many + many / 2) return std::numeric_limits<float>::infinity();
+    return things > many ? test.shared_from : 0;
   };
   const auto walk = [&] {  // the tree below what is on the stack
     while (!stack_.empty()) {
