@@ -42,6 +42,7 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
     : executor_(executor),
       view_(container, options.lost),
       options_(options.gather),
+      things_left_(options.things_left),
       visibility_(options.visibility_of_sky()),
       own_cache_(options.cache ? nullptr : make_cache(container, options, executor)),
       cache_(options.cache ? *options.cache : *own_cache_),
@@ -53,7 +54,7 @@ Shader::Shader(const ContainerReader& container, const ShadeOptions& options,
 
 Gather& Shader::gather(unsigned thread) {
   if (!gathers_[thread])
-    gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_, visibility_);
+    gathers_[thread] = std::make_unique<Gather>(view_, cache_, options_, visibility_, things_left_);
   return *gathers_[thread];
 }
 

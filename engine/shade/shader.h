@@ -35,6 +35,7 @@ struct ShadeOptions {
   /// How many variants there are to choose from. Each turns the direction cube and shifts the
   /// receiver cells in another way.
   unsigned variants = 1;
+  std::size_t things_left = Gather::kThingsLeft;  ///< of each gather: fewer in a test
 
   /// Returns what a gather needs to find the sky through small openings; empty without a sky.
   [[nodiscard]] VisibilityMaker visibility_of_sky() const {
@@ -88,6 +89,7 @@ class Shader {
   SceneView view_;
   std::vector<std::unique_ptr<DirectionGrid>> grids_;  ///< by variant
   GatherOptions options_;
+  std::size_t things_left_;
   VisibilityMaker visibility_;
   std::unique_ptr<PageCache> own_cache_;
   PageCache& cache_;

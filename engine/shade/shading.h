@@ -84,9 +84,6 @@ struct GatherOptions {
   /// Whether what surfaces emit is part of their light. False where emitters light the receivers
   /// otherwise (spec/shading.md#emission).
   bool emission = true;
-  /// Things that a cell of receivers leaves to the cells within before it leaves near clusters
-  /// unopened, too: a limit of memory (spec/notes/lists.md). Fewer take more time.
-  std::uint32_t things_left = 24576;
 };
 
 // Constants of the disc that stands for a cluster (spec/shading.md#splats).

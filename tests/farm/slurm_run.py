@@ -74,7 +74,7 @@ class Run:
                 killed = running[0]
                 victims = self.cluster.kill_node(killed)
                 self.notes.append(f"Node {killed} was killed {time.time() - begun:.0f} s after the start with {running.count(killed)} "
-                                  f"tasks on it ({len(victims)} processes), when {sum(t['state'] == 'done' for t in states)} of {lights} parts were lit.")
+                                  f"{'task' if running.count(killed) == 1 else 'tasks'} on it ({len(victims)} processes), when {sum(t['state'] == 'done' for t in states)} of {lights} parts were lit.")
             time.sleep(1)
         self.steps(tasks, begun)
         if tuning := self.status().get("tuning"):
@@ -88,10 +88,10 @@ class Run:
         names = {"part": "unlit.{number}", "join": "unlit", "light": "part.{number}", "join_light": "join"}
         steps = {}
         for task in tasks:
-            steps.setdefault(task["kind"], []).append(task)
-        for kind, of in steps.items():
-            ends = [(done / names.get(kind, "{name}").format(**task)).stat().st_mtime for task in of]
-            self.rows.append((kind, "`ptcfarm`", len(of), f"{max(ends) - last:.0f}", ""))
+            steps.setdefault(task["name"].split(".")[0], []).append(task)
+        for step, of in steps.items():
+            ends = [(done / names.get(task["kind"], "{name}").format(**task)).stat().st_mtime for task in of]
+            self.rows.append((step, "`ptcfarm`", len(of), f"{max(ends) - last:.0f}", ""))
             last = max(ends)
         self.rows.append(("all of these", "Slurm, 4 nodes", len(tasks), f"{last - begun:.0f}", ""))
 
@@ -122,7 +122,7 @@ class Run:
         same = farm == one and filecmp.cmp(self.here / "farm.ply", self.here / "one.ply", shallow=False)
         self.notes.append(f"Points: {one[1]:,}. Digest of the tree: {one[0]} on one machine, {farm[0]} by the cluster; the files of shaded points "
                           f"are {'equal, byte for byte' if same else 'DIFFERENT'}.")
-        settings = " ".join(f"--{name.replace('_', '-')} {getattr(self.arguments, name)}" for name in ("points", "count", "bounces", "task_memory"))
+        settings = " ".join(f"--{name.replace('_', '-')} {getattr(self.arguments, name)}" for name in ("points", "count", "bounces", "task_memory", "error") if getattr(self.arguments, name))
         text = ["# A city by a cluster of Slurm", "",
                 f"Written by `python3 tests/farm/slurm_run.py build/release/bin FOLDER {settings} --output ...`, one run. A real slurmctld and four slurmd on "
                 f"one machine of {os.cpu_count()} cores, so that nodes share its cores and its disk: the times say what tasks cost, not what four machines gain.", "",
@@ -140,7 +140,7 @@ if __name__ == "__main__":
     parser.add_argument("folder", type=Path)
     parser.add_argument("--points", default="200M")
     parser.add_argument("--count", default="16k")
-    parser.add_argument("--bounces", default="1", help="from 2 on, waves of tasks light all points again before the count is shaded")
+    parser.add_argument("--bounces", default="1", help="2 or more: each further bounce is a wave of tasks that lights every point before --count points are shaded")
     parser.add_argument("--task-memory", default="1G", help="the cap of each task: smaller ones make more parts")
     parser.add_argument("--error")
     parser.add_argument("--output", type=Path, required=True)

@@ -124,7 +124,7 @@ def replay(place, arguments, tally):
     trace.unlink(missing_ok=True)
     run = place.run(trace=trace)
     calls = read_trace(trace)
-    fates = (20 if place.scenario.slow else 300) if arguments.all else 1 if place.scenario.slow else 4 if place.scenario.keeps else 10
+    fates = (20 if place.scenario.slow else 300) if arguments.all else (1 if place.scenario.slow else 5)
     disk, target = Disk(str(place.target)), str(place.target)
     states = old = new = 0
     for point in range(len(calls) + 1):

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -13,8 +13,8 @@
 
 namespace ptc::test {
 
-/// GatherOptions::things_left for small scenes: so few that most cells leave clusters unopened.
-inline constexpr std::uint32_t kFewLeft = 40;
+/// ShadeOptions::things_left for small scenes: so few that most cells leave clusters unopened.
+inline constexpr std::size_t kFewLeft = 40;
 
 /// A container of surfels, its reader, and receivers.
 struct Scene {

@@ -48,7 +48,8 @@ endif()
 
 # ptc_compile_together(<target> <number>) compiles files in groups of that number: most of the time of each went to
 # headers and templates that all of them need. Only for Release: the other presets compile each file alone, and find
-# what one includes too little. Sources that include themselves once for each instruction set stay alone.
+# what one includes too little. Sources that include themselves once for each instruction set stay alone. Names of
+# unnamed namespaces have to differ within a target, because a new source moves all groups behind it.
 function(ptc_compile_together target number)
   if(CMAKE_BUILD_TYPE STREQUAL "Release")
     get_target_property(sources ${target} SOURCES)

@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -48,7 +47,7 @@
 #include "engine/store/reader.h"
 #include "engine/store/writer.h"
 #include "format/error.h"
-#include "format/point_page.h"
+#include "format/node_page.h"
 #include "format/text.h"
 
 namespace ptc {

@@ -1,7 +1,6 @@
 #include "engine/pipeline/build/build_memory.h"
 
 #include <algorithm>
-#include <utility>
 #include <vector>
 
 #include "engine/io/file/remote_file.h"
@@ -9,7 +8,6 @@
 #include "engine/octree/build_pages.h"
 #include "engine/scene/sampling/streamed_sampler.h"
 #include "engine/store/writer.h"
-#include "format/node_page.h"
 #include "format/point_page.h"
 
 namespace ptc {

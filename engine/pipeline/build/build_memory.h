@@ -47,7 +47,8 @@ class BuildMemory {
   /// Returns the memory for meshes. While they are read, nothing else takes any.
   [[nodiscard]] MeshLimits mesh_limits() const;
 
-  /// Charges the inputs to a budget(), and returns what their sampling may use.
+  /// Charges the inputs to a budget(), and returns what their sampling may use, but for the
+  /// directories of StreamingRoom.
   /// @throws LimitError when the cap is too small for them
   [[nodiscard]] SamplingRoom charge_inputs(const BuildInputs& inputs, MemoryBudget& budget) const;
 

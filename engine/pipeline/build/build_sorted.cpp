@@ -7,10 +7,10 @@
 
 #include "engine/octree/build_pages.h"
 #include "engine/octree/merge.h"
+#include "engine/octree/rounding.h"
 #include "engine/pipeline/build/append.h"
 #include "engine/pipeline/build/point_marks.h"
 #include "engine/sort/point_streams.h"
-#include "engine/sort/spill.h"
 #include "engine/store/container_points.h"
 #include "engine/store/writer.h"
 

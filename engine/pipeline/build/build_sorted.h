@@ -15,8 +15,8 @@
 //                              v
 //             ContainerWriter::finish()
 //
-// Each is a PointStream that pulls blocks from the one before it, so that none holds more than its
-// own blocks.
+// Each down to round_points is a PointStream that pulls blocks from the one before it, so that none
+// holds more than its own blocks.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +49,7 @@ struct OpenBuild {
   const BuildRequest& request;
   const std::filesystem::path& target;  ///< beside which temporary files may lie
   const ContainerReader* scene;         ///< container that is appended to; null: none
-  Resumption* resumption;               ///< null: the build cannot be continued
+  const Resumption* resumption;         ///< null: the build cannot be continued
   const Executor& executor;
   Progress& progress;  ///< in a stage that counts points
 };

@@ -12,7 +12,6 @@
 #include "engine/pipeline/build/placed_points.h"
 #include "engine/pipeline/build/unknown_values.h"
 #include "engine/pipeline/convert/convert.h"
-#include "engine/pipeline/point_input.h"
 #include "engine/pipeline/scene_record.h"
 
 namespace ptc {
@@ -84,7 +83,7 @@ void Clouds::shorten_records(Progress& progress) {
 void Clouds::read_points(PointFile& file, bool alone, Cloud& cloud, Progress& progress) {
   ValueWatch watch(alone ? std::span<const Channel>() : cloud.channels);
   bool lacks_normals = false, lacks_radii = true;
-  std::vector<Surfel> block(kCloudBlock);
+  std::vector<Surfel> block(kSurfelBlock);
   while (const std::size_t count = file.source->next(block)) {
     for (std::size_t i = 0; i < count; ++i) {
       bounds.add(block[i].position);

@@ -19,8 +19,8 @@
 
 namespace ptc {
 
-inline constexpr std::size_t kCloudBlock = 1 << 14;  ///< surfels read from a source at once
-inline constexpr std::size_t kSampleKeys = 1 << 16;  ///< positions that the sort's splitters need
+inline constexpr std::size_t kSurfelBlock = 1 << 14;  ///< surfels read from a source at once
+inline constexpr std::size_t kSampleKeys = 1 << 16;   ///< positions that the sort's splitters need
 
 /// Where the bounds of clouds come from. Those that a file says of itself save a pass over it; a
 /// build that begins again because they were wrong takes those of the points.

@@ -7,7 +7,6 @@
 
 #include "engine/io/cloud/record.h"
 #include "engine/pipeline/build/placed_points.h"
-#include "engine/pipeline/build/point_marks.h"
 #include "engine/scene/procedural/city.h"
 
 namespace ptc {
@@ -82,8 +81,8 @@ class Feeder {
   AttributeSorts& attributes_;
   const Executor& executor_;
   Progress& progress_;
-  std::vector<Surfel> surfels_ = std::vector<Surfel>(kCloudBlock);
-  std::vector<PointRecord> records_ = std::vector<PointRecord>(kCloudBlock);
+  std::vector<Surfel> surfels_ = std::vector<Surfel>(kSurfelBlock);
+  std::vector<PointRecord> records_ = std::vector<PointRecord>(kSurfelBlock);
   std::uint64_t points_;  ///< number of the next point
 };
 

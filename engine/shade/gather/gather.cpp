@@ -39,9 +39,10 @@ void split(std::span<const PlacedReceiver> cell, const Body& body) {
 }  // namespace
 
 Gather::Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
-               const VisibilityMaker& visibility)
+               const VisibilityMaker& visibility, std::size_t things_left)
     : scene_(view, cache),
       options_(options),
+      things_left_(things_left),
       empty_(options.resolution, options.bleeding),
       leaf_(options.resolution, options.bleeding) {
   empty_.clear();
@@ -221,13 +222,12 @@ const DirectionBuffer& Gather::collect(const ReceiverCell& cell, const Direction
     queue_.size = 0;
   };
   // Without a limit, a cell of receivers that lie far apart leaves all surfels between them. A low
-  // one costs time: what a cell does not open is opened in several of the cells within. One that
-  // has left half as much again leaves all clusters that it would open
+  // limit costs time: what a cell does not open is opened in several of the cells within. A cell
+  // that has left half as much again leaves all clusters that it would open
   const auto kept_within = [&] {
     const std::size_t things = left ? left->size() + opened_.size() : 0;
-    const std::size_t many = options_.things_left;
-    if (things > many + many / 2) return std::numeric_limits<float>::infinity();
-    return things > many ? test.shared_from : 0;
+    if (things > things_left_ + things_left_ / 2) return std::numeric_limits<float>::infinity();
+    return things > things_left_ ? test.shared_from : 0;
   };
   const auto walk = [&] {  // the tree below what is on the stack
     while (!stack_.empty()) {

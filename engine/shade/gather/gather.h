@@ -32,11 +32,17 @@ namespace ptc {
 /// of what cells leave to those within them (spec/notes/lists.md).
 class Gather {
  public:
-  /// @param view        must outlive the gather, as must the cache
-  /// @param visibility  finds the sky through small openings, where the whole hemisphere counts;
-  ///                    empty: the sky stays as it is drawn
+  /// The number of things that a cell leaves to the cells within before it leaves near clusters
+  /// unopened, too. More take more memory than a cap is charged, fewer take time
+  /// (spec/notes/lists.md).
+  static constexpr std::size_t kThingsLeft = 24576;
+
+  /// @param view         must outlive the gather, as must the cache
+  /// @param visibility   finds the sky through small openings, where the whole hemisphere counts;
+  ///                     empty: the sky stays as it is drawn
+  /// @param things_left  kThingsLeft, or fewer in a test
   Gather(const SceneView& view, PageCache& cache, const GatherOptions& options,
-         const VisibilityMaker& visibility = {});
+         const VisibilityMaker& visibility = {}, std::size_t things_left = kThingsLeft);
 
   /// Shades receivers.
   /// @param receivers  neighbours, in any order; a few thousand at once share best
@@ -90,6 +96,7 @@ class Gather {
 
   SceneReader scene_;
   GatherOptions options_;
+  std::size_t things_left_;
   std::optional<PixelWeights> weights_;  ///< of GatherOptions::around, unless that is plain
   const DirectionGrid* grid_ = nullptr;  ///< of the current call
   GatherCounts counts_;

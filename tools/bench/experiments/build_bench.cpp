@@ -30,7 +30,8 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kVerifiedWhole = 2'000'000;  // points up to which the tree is built again
+constexpr std::uint64_t kBuildVerifiedWhole =
+    2'000'000;  // points up to which the tree is built again
 
 /// The records of a city in a file, and what a build must know about them.
 struct Input {
@@ -169,7 +170,7 @@ class BuildRun : BenchRun<BuildBenchOptions, BuildRow> {
   /// @throws DataError otherwise
   void require_right(const Input& input, const std::string& profile, Built& built) {
     const VerifyLevel level =
-        input.file.records() <= kVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
+        input.file.records() <= kBuildVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
     Progress silent;
     const VerifyReport report =
         verify_container(target_, {.level = level, .threads = run_.threads}, silent);

@@ -51,10 +51,10 @@ std::vector<Pilot> pilots_of(const Blocks& blocks, std::size_t count, double pha
 }
 
 /// Judges settings at receivers of a run.
-class Judge {
+class KnobJudge {
  public:
-  Judge(const ContainerReader& scene, const ShadeOptions& options, std::vector<Pilot> pilots,
-        unsigned rays, const Executor& executor)
+  KnobJudge(const ContainerReader& scene, const ShadeOptions& options, std::vector<Pilot> pilots,
+            unsigned rays, const Executor& executor)
       : scene_(scene),
         view_(scene),
         options_(options),
@@ -176,7 +176,8 @@ std::vector<KnobRow> measure_knob(const SceneChoice& choice, const KnobOptions& 
     const Blocks blocks = blocks_of(container.header().frame, set.receivers, executor);
     const std::size_t judged = options.checked / Pilot::kCompared;
     progress.begin(choice.name + ", " + set.name, options.asked.size() * options.seeds, "choices");
-    Judge judge(container, shade, pilots_of(blocks, judged, kJudgePhase), options.rays, executor);
+    KnobJudge judge(container, shade, pilots_of(blocks, judged, kJudgePhase), options.rays,
+                    executor);
     for (const double asked : options.asked) {
       KnobRow row{.scene = choice.name, .set = set.name, .asked = asked};
       for (unsigned seed = 0; seed < options.seeds; ++seed) {

@@ -28,7 +28,8 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kVerifiedWhole = 2'000'000;  // points up to which the tree is built again
+constexpr std::uint64_t kScaleVerifiedWhole =
+    2'000'000;  // points up to which the tree is built again
 // Bytes of one memcpy, far more than the caches of processors hold.
 constexpr std::size_t kCopiedBytes = std::size_t{64} << 20;
 
@@ -114,7 +115,7 @@ class ScaleRun : BenchRun<ScaleOptions, ScaleRow> {
     const std::uint64_t made = report.superblock->points;
     // Build the tree of the first container again, unless it is large
     if (first) {
-      if (made <= kVerifiedWhole) {
+      if (made <= kScaleVerifiedWhole) {
         verification.level = VerifyLevel::rebuild;
         report = verify_container(scene_, verification, silent);
         require_whole(report, points, runs.built.sort.points);

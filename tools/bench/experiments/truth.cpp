@@ -21,7 +21,7 @@
 namespace ptc::bench {
 namespace {
 
-constexpr unsigned kSide = 4;  // rays along the side of a pixel that tell what it shows
+constexpr unsigned kRaysAlong = 4;  // rays along the side of a pixel that tell what it shows
 
 /// Says of each pixel whether all rays through it and its borders meet one surface that is smooth
 /// and does not emit.
@@ -32,15 +32,15 @@ std::vector<char> pixels_of_one_surface(const RayScene& scene, const Camera& cam
     for (std::size_t x = 0; x < camera.width; ++x) {
       const auto hit_at = [&](unsigned i, unsigned j) {
         const auto along = [](std::size_t pixel, unsigned step) {
-          return static_cast<float>(pixel) + static_cast<float>(step) / kSide;
+          return static_cast<float>(pixel) + static_cast<float>(step) / kRaysAlong;
         };
         return scene.closest(camera.position, camera.direction(along(x, i), along(y, j)), 0,
                              std::numeric_limits<double>::infinity());
       };
       const auto first = hit_at(0, 0);
       bool one = first.has_value();
-      for (unsigned k = 0; one && k < (kSide + 1) * (kSide + 1); ++k) {
-        const auto hit = hit_at(k % (kSide + 1), k / (kSide + 1));
+      for (unsigned k = 0; one && k < (kRaysAlong + 1) * (kRaysAlong + 1); ++k) {
+        const auto hit = hit_at(k % (kRaysAlong + 1), k / (kRaysAlong + 1));
         one = hit && hit->emission == glm::vec3(0) && hit->front &&
               glm::dot(hit->normal, first->normal) > 0.95F &&
               std::abs(glm::dot(hit->position - first->position,
@@ -53,10 +53,10 @@ std::vector<char> pixels_of_one_surface(const RayScene& scene, const Camera& cam
 }
 
 /// Renders pictures of one scene by the judge.
-class Judge {
+class TruthJudge {
  public:
-  Judge(const BuiltRoom& room, const TruthOptions& options, const std::filesystem::path& work,
-        const RunOptions& run, Progress& progress)
+  TruthJudge(const BuiltRoom& room, const TruthOptions& options, const std::filesystem::path& work,
+             const RunOptions& run, Progress& progress)
       : room_(room),
         options_(options),
         directory_(work / ".ptcbench-mitsuba"),
@@ -113,7 +113,7 @@ Truth measure_truth(const SceneChoice& choice, const TruthOptions& options,
                     const std::filesystem::path& work, const RunOptions& run, Progress& progress) {
   const WorkFile built(work, "-truth.ptcx"), rendered(work, "-truth.exr");
   const BuiltRoom room = build_room(choice, options.room, built.path(), run, progress);
-  Judge judge(room, options, work, run, progress);
+  TruthJudge judge(room, options, work, run, progress);
   Truth truth{.scene = choice.name, .rows = {}, .sheet = {}};
   const auto [width, height] = options.room.size;
   for (const unsigned bounces : options.bounces) {

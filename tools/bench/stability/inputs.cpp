@@ -34,7 +34,7 @@ std::vector<Surfel> ball_on_floor(double spacing) {
 }
 
 std::vector<Receiver> receivers_below_ball(double lift) {
-  return receivers_on_grid(kSide, kSide, [&](double u, double v) {
+  return receivers_on_grid(kReceiversAlong, kReceiversAlong, [&](double u, double v) {
     return Receiver{{2 * u - 1, 2 * v - 1, lift}, {0, 0, 1}};
   });
 }
@@ -46,7 +46,7 @@ Field changed(const Lab& lab, const Change& change) {
   constexpr double kSpacing = 0.04;
   std::vector<Surfel> surfels = ball_on_floor(kSpacing);
   const auto receivers = receivers_below_ball(0.1 * kSpacing);
-  Field field{.width = kSide, .height = kSide};
+  Field field{.width = kReceiversAlong, .height = kReceiversAlong};
   field.truth = values(SmallScene(lab, surfels).shade(receivers), brightness);
   Random random(18);
   change(surfels, random);
@@ -101,7 +101,7 @@ Outcome degenerate_points(const Lab& lab) {
   const auto receivers = receivers_below_ball(0.1 * kSpacing);
   std::vector<Shading> shaded(receivers.size());
   Shader(container, {.cache_bytes = 64U << 20}, lab.executor).shade(receivers, shaded, silent);
-  Field field{kSide, kSide, values(shaded, brightness),
+  Field field{kReceiversAlong, kReceiversAlong, values(shaded, brightness),
               values(SmallScene(lab, surfels).shade(receivers), brightness)};
   const double rms = relative_rms(field.ours, field.truth);
   return {.figures = {{"light, RMS change over its mean", rms, 0.05}}, .field = std::move(field)};
@@ -172,7 +172,7 @@ Outcome moved(const Lab& lab) {
                    largest_difference(large, truth), 0.03},
                   {"light, largest change in another order of points",
                    largest_difference(reversed, truth), 0.0}},
-      .field = {kSide, kSide, far, truth}};
+      .field = {kReceiversAlong, kReceiversAlong, far, truth}};
 }
 
 /// One point a million kilometres away: a thousandth of a metre is 12 orders below the extent.
@@ -199,16 +199,17 @@ Outcome needles(const Lab& lab) {
   const SmallScene scene(lab, mesh, lights, 20'000);
   double area = 0;
   for (const Surfel& s : scene.surfels()) area += 2 * std::pow(double{s.radius}, 2);
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    return Receiver{{1.6 * u - 0.3, 1.6 * v - 0.3, 0}, {0, 0, 1}};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        return Receiver{{1.6 * u - 0.3, 1.6 * v - 0.3, 0}, {0, 0, 1}};
+      });
   const std::array<glm::dvec3, 4> sheet{{{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}}};
   std::vector<glm::vec3> truth;
   for (const Receiver& receiver : receivers) truth.emplace_back(1 - form_factor(receiver, sheet));
   const auto ours = values(scene.shade(receivers), openness);
   return {.figures = {{"area of the discs, error", std::abs(area - 1), 0.05},
                       {"occlusion, largest error", largest_difference(ours, truth), 0.02}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// Ten dense spots in a space a million times as wide: bytes for each point.
@@ -248,9 +249,10 @@ Outcome one_pixel_sun(const Lab& lab) {
   lights.sky.map_path = "sun.exr";  // which the container records, and nothing here reads
   const SmallScene scene(lab, mesh, lights, 60'000);
   const double lift = 0.15 * scene.radius();
-  const auto receivers = receivers_on_grid(kSide, kSide, [&](double u, double v) {
-    return Receiver{{4 * u - 2, lift, 4 * v - 2}, {0, 1, 0}};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [&](double u, double v) {
+        return Receiver{{4 * u - 2, lift, 4 * v - 2}, {0, 1, 0}};
+      });
   const auto shaded = scene.shade(receivers, sky_function(smooth_sky(lights.sky)));
   const RayScene rays(mesh);
   const DirectLight light(rays, lights);
@@ -266,7 +268,7 @@ Outcome one_pixel_sun(const Lab& lab) {
   return {.figures = {{"light of the sky, RMS error over its mean", relative_rms(ours, truth), 0.1},
                       {"light of the sky, error of its mean",
                        std::abs(mean_value(ours) / mean_value(truth) - 1), 0.02}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 constexpr std::array kInputRows = std::to_array<Row>({

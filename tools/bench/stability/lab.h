@@ -20,9 +20,9 @@
 
 namespace ptc::bench {
 
-constexpr unsigned kSide = 32;          ///< receivers along the side of a square of them
-constexpr unsigned kFrames = 100;       ///< of what moves
-constexpr double kAllowedStep = 0.005;  ///< of white, beyond one and a half of a true step
+inline constexpr unsigned kReceiversAlong = 32;  ///< receivers along the side of a square of them
+inline constexpr unsigned kMovingFrames = 100;   ///< frames of what moves
+inline constexpr double kAllowedStep = 0.005;    ///< of white, beyond one and a half of a true step
 
 /// Where rows are measured.
 struct Lab {

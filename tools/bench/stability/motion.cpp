@@ -48,7 +48,7 @@ double largest_step(const std::vector<glm::vec3>& frames) {
 /// Finishes a row whose frames are complete.
 Outcome finished_line(Field field) {
   field.width = kMovingReceivers;
-  field.height = kFrames;
+  field.height = kMovingFrames;
   const double step = largest_step(field.ours), true_step = largest_step(field.truth);
   return {.figures = {{"light, largest step beyond 1.5 of the true one",
                        std::max(0.0, step - 1.5 * true_step), kAllowedStep},
@@ -66,14 +66,14 @@ void add_frame(const SmallScene& scene, const std::vector<Receiver>& receivers, 
 Outcome moving_receivers(const Lab& lab) {
   const SmallScene scene(lab, scene_with_ball({0, 0, 0.4}, {0.9F, 0.5F, 0.1F}));
   Field field;
-  for (unsigned i = 0; i < kFrames; ++i) add_frame(scene, on_floor(0.005 * i), field);
+  for (unsigned i = 0; i < kMovingFrames; ++i) add_frame(scene, on_floor(0.005 * i), field);
   return finished_line(std::move(field));
 }
 
 /// The ball moves; the scene is built anew for each frame.
 Outcome moving_ball(const Lab& lab, const glm::vec3& light) {
   Field field;
-  for (unsigned i = 0; i < kFrames; ++i) {
+  for (unsigned i = 0; i < kMovingFrames; ++i) {
     const glm::dvec3 middle(0.012 * i - 0.6, 0.1, 0.4);
     add_frame(SmallScene(lab, scene_with_ball(middle, light)), on_floor(0), field);
   }

@@ -162,7 +162,8 @@ Outcome finished_pictures(const Frames& frames, const MotionBounds& bounds) {
 }
 
 /// Pictures by a camera that moves through a scene.
-Frames fly(const PanelPictures& pictures, Camera (*camera)(unsigned), unsigned count = kFrames) {
+Frames fly(const PanelPictures& pictures, Camera (*camera)(unsigned),
+           unsigned count = kMovingFrames) {
   Frames frames{.width = camera(0).width, .height = camera(0).height};
   for (unsigned f = 0; f < count; ++f)
     frames.add(pictures.render(camera(f)), pictures.truth(camera(f)));
@@ -181,7 +182,7 @@ Outcome at_contacts(const Lab& lab) {
 
 Outcome with_lamp(const Lab& lab) {
   const PanelPictures pictures(lab, furniture_with_lamp(), kPictureSpacing, glm::vec3(0));
-  return finished_pictures(fly(pictures, grazing_camera, kFrames / 2),
+  return finished_pictures(fly(pictures, grazing_camera, kMovingFrames / 2),
                            {0.07, 0.07, 0.45, 0.015, 0.015});
 }
 
@@ -216,13 +217,13 @@ class SlidingBlock {
         << fmt::format(R"({{"ptcx_scene": 1, "objects": [{{"file": "{}"}}, {{"file": "{}", )",
                        name(still_file_), name(block_file_))
         << fmt::format(R"("keys": [{{"frame": 1, "translate": [{}, 0, 0]}}, )", kFrom)
-        << fmt::format(R"({{"frame": {}, "translate": [{}, 0, 0]}}]}}]}})", kFrames, kTo);
+        << fmt::format(R"({{"frame": {}, "translate": [{}, 0, 0]}}]}}]}})", kMovingFrames, kTo);
   }
 
   /// Returns all panels at a frame, counted from 0.
   [[nodiscard]] std::vector<Panel> at(unsigned frame) const {
     std::vector<Panel> panels = still_;
-    const double way = kFrom + (kTo - kFrom) * frame / (kFrames - 1);
+    const double way = kFrom + (kTo - kFrom) * frame / (kMovingFrames - 1);
     for (Panel moved : block_) {
       for (glm::dvec3& corner : moved.corners) corner.x += way;
       panels.push_back(std::move(moved));
@@ -250,13 +251,13 @@ Outcome sliding_block(const Lab& lab) {
   request.camera->vertical_fov = 0.6F;
   request.lights = LightRig{.sky = {.radiance = glm::vec3(1)}};
   request.bounces = 0;
-  request.sequence = SequenceRequest{.frames = {1, kFrames}};
+  request.sequence = SequenceRequest{.frames = {1, kMovingFrames}};
   request.run.threads = lab.executor.threads();
   const std::array targets{PictureTarget{.path = names.path()}};
   Progress silent;
   render_picture(request, targets, silent);
   Frames frames{.width = request.camera->width, .height = request.camera->height};
-  for (unsigned f = 0; f < kFrames; ++f) {
+  for (unsigned f = 0; f < kMovingFrames; ++f) {
     const std::filesystem::path file = *frame_name(names.path(), f + 1);
     std::vector<glm::vec3> ours = read_image(file).pixels;
     std::filesystem::remove(file);

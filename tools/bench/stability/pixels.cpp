@@ -35,7 +35,7 @@ Surfel disc_at(const glm::dvec3& position, const glm::vec3& normal, double radiu
 
 /// Planes of any tilt and scale see nothing of themselves.
 Outcome lone_plane(const Lab& lab) {
-  Outcome outcome{.field = {.width = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong}};
   for (const double scale : {1e-3, 1.0, 1e4}) {
     for (int turn = 0; turn < 4; ++turn) {
       const double a = 0.7 * turn;
@@ -46,7 +46,7 @@ Outcome lone_plane(const Lab& lab) {
                     glm::vec3(1));
       // At the rim, in corners and inside
       std::vector<Receiver> receivers;
-      for (std::size_t i = 0; receivers.size() < std::size_t{4} * kSide; i += 19) {
+      for (std::size_t i = 0; receivers.size() < std::size_t{4} * kReceiversAlong; i += 19) {
         const Surfel& s = surfels[i % surfels.size()];
         receivers.push_back({s.position + glm::dvec3(s.normal * (0.15F * s.radius)), s.normal});
       }
@@ -61,9 +61,9 @@ Outcome lone_plane(const Lab& lab) {
 /// Single discs anywhere around the receiver, many of them behind it and beside it.
 Outcome random_discs(const Lab& lab) {
   Random random(4);
-  Outcome outcome{.field = {.width = kSide, .height = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong, .height = kReceiversAlong}};
   constexpr unsigned kRays = 1 << 14;
-  for (unsigned i = 0; i < kSide * kSide; ++i) {
+  for (unsigned i = 0; i < kReceiversAlong * kReceiversAlong; ++i) {
     const glm::vec3 normal = random.direction();
     glm::dvec3 to = glm::dvec3(random.direction()) * random.between(0.3, 3);
     if (glm::dot(to, glm::dvec3(normal)) > 0) to = -to;  // its front
@@ -95,11 +95,11 @@ Outcome random_discs(const Lab& lab) {
 Outcome turned(const Lab& lab) {
   constexpr double kSpacing = 0.04;
   const std::vector<Surfel> upright = small_scene(kSpacing);
-  const auto receivers = floor_receivers(kSide, 0.1 * kSpacing);
+  const auto receivers = floor_receivers(kReceiversAlong, 0.1 * kSpacing);
   const SmallScene first(lab, upright);
   const auto traced = first.trace(receivers, 4096);
   const auto truth = values(traced, brightness);
-  Outcome outcome{.field = {kSide, kSide, {}, truth}};
+  Outcome outcome{.field = {kReceiversAlong, kReceiversAlong, {}, truth}};
   Random random(5);
   double worst = 0, square = 0;
   constexpr int kTurns = 8;
@@ -148,9 +148,10 @@ Outcome edge_on(const Lab& lab) {
       faces.push_back({corner, corner + u, corner + u + v, corner + v});
     }
   }
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    return Receiver{{4 * u - 2, 4 * v - 2, -0.1}, {0, 0, 1}};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        return Receiver{{4 * u - 2, 4 * v - 2, -0.1}, {0, 0, 1}};
+      });
   std::vector<glm::vec3> truth;
   for (const Receiver& receiver : receivers) {
     double covered = 0;
@@ -161,13 +162,13 @@ Outcome edge_on(const Lab& lab) {
   return {
       .figures = {{"occlusion, largest error", largest_difference(ours, truth), 0.02},
                   {"occlusion, mean error", std::abs(mean_value(ours) - mean_value(truth)), 0.004}},
-      .field = {kSide, kSide, ours, truth}};
+      .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// The gather without clusters, beside all surfels drawn one by one.
 Outcome nothing_culled(const Lab& lab) {
   const SmallScene scene(lab, small_scene(0.1));
-  const auto receivers = floor_receivers(kSide, 0.01);
+  const auto receivers = floor_receivers(kReceiversAlong, 0.01);
   GatherOptions exact{.solid_angle = 1e-12F, .parallax = 1e-6F};
   const auto shaded = scene.shade(receivers, {}, exact);
   std::vector<Shading> all(receivers.size());
@@ -176,7 +177,7 @@ Outcome nothing_culled(const Lab& lab) {
   const auto ours = values(shaded, brightness), truth = values(all, brightness);
   // Rounding at the edges of discs moves single pixels
   return {.figures = {{"light, RMS difference", rms_difference(ours, truth), 1e-3}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// Receivers within a shell of few large discs, whose clusters have boxes around them.
@@ -188,25 +189,26 @@ Outcome shell(const Lab& lab) {
     surfel.radius *= 1.3F;  // no gaps between discs
   }
   const SmallScene scene(lab, surfels);
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    const glm::vec3 normal(std::cos(20 * u), std::sin(20 * u) * 0.6F, std::sin(20 * u) * 0.8F);
-    return Receiver{{1.2 * u - 0.6, 1.2 * v - 0.6, 0.1}, glm::normalize(normal)};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        const glm::vec3 normal(std::cos(20 * u), std::sin(20 * u) * 0.6F, std::sin(20 * u) * 0.8F);
+        return Receiver{{1.2 * u - 0.6, 1.2 * v - 0.6, 0.1}, glm::normalize(normal)};
+      });
   const auto ours = values(scene.shade(receivers), brightness);
   const auto truth = grey(ours.size(), 1);
   return {.figures = {{"light, largest error", largest_difference(ours, truth), 0.03},
                       {"light, RMS error", rms_difference(ours, truth), 0.01}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// One small disc in each of a thousand directions.
 Outcome thousand_directions(const Lab& lab) {
   constexpr double kSolidAngle = 0.02;
   Random random(12);
-  Outcome outcome{.field = {.width = kSide, .height = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong, .height = kReceiversAlong}};
   const DirectionGrid grid(GatherOptions().resolution, {});
   double sum = 0;
-  for (unsigned i = 0; i < kSide * kSide; ++i) {
+  for (unsigned i = 0; i < kReceiversAlong * kReceiversAlong; ++i) {
     const glm::vec3 direction = random.direction();
     const double distance = std::exp(6 * random.unit() - 3);
     const std::array disc{disc_at(glm::dvec3(direction) * distance, -direction,
@@ -219,8 +221,9 @@ Outcome thousand_directions(const Lab& lab) {
     outcome.field.ours.emplace_back(0.5 * ratio);
   }
   outcome.field.truth = grey(outcome.field.ours.size(), 0.5);
-  outcome.figures = {{"solid angle, mean error", std::abs(sum / (kSide * kSide) - 1), 0.02},
-                     {"solid angle, RMS error", 2 * outcome.field.rms_error(), 0.15}};
+  outcome.figures = {
+      {"solid angle, mean error", std::abs(sum / (kReceiversAlong * kReceiversAlong) - 1), 0.02},
+      {"solid angle, RMS error", 2 * outcome.field.rms_error(), 0.15}};
   return outcome;
 }
 
@@ -315,12 +318,13 @@ Outcome grazing(const Lab& lab) {
   add_rectangle(surfels, {-kHalf, -kHalf, 0}, {2 * kHalf, 0, 0}, {0, 2 * kHalf, 0}, kSpacing,
                 glm::vec3(1));
   const SmallScene scene(lab, surfels);
-  const auto receivers = receivers_on_grid(kSide, kSide, [&](double u, double v) {
-    const double lean = 89.9 * kPiDouble / 180 * v, turn = 2 * kPiDouble * u;
-    const glm::dvec3 normal(std::sin(lean) * std::cos(turn), std::sin(lean) * std::sin(turn),
-                            std::cos(lean));
-    return Receiver{{3.17 * u, 2.23 * v, 0.1 * kSpacing}, glm::vec3(normal)};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [&](double u, double v) {
+        const double lean = 89.9 * kPiDouble / 180 * v, turn = 2 * kPiDouble * u;
+        const glm::dvec3 normal(std::sin(lean) * std::cos(turn), std::sin(lean) * std::sin(turn),
+                                std::cos(lean));
+        return Receiver{{3.17 * u, 2.23 * v, 0.1 * kSpacing}, glm::vec3(normal)};
+      });
   // The plane covers all below its horizon, but for what lies beyond its edge
   const std::array<glm::dvec3, 4> plane{
       {{-kHalf, -kHalf, 0}, {kHalf, -kHalf, 0}, {kHalf, kHalf, 0}, {-kHalf, kHalf, 0}}};
@@ -329,7 +333,7 @@ Outcome grazing(const Lab& lab) {
   const auto ours = values(scene.shade(receivers), brightness);
   return {.figures = {{"light of the plane, largest error", largest_difference(ours, truth), 0.02},
                       {"light of the plane, RMS error", rms_difference(ours, truth), 0.01}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 constexpr std::array kPixelRows = std::to_array<Row>({

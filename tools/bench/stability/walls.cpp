@@ -33,18 +33,19 @@ Outcome closed_ball(const Lab& lab) {
   for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
   const SmallScene scene(lab, mesh, {}, 20'000);
   // In a slice through the ball, up to its surface
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    const double ring = 0.99 * u, turn = 2 * kPiDouble * v;
-    const glm::dvec3 at(ring * std::cos(turn), ring * std::sin(turn), 0);
-    return Receiver{at, glm::vec3(-std::cos(turn), -std::sin(turn), 0)};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        const double ring = 0.99 * u, turn = 2 * kPiDouble * v;
+        const glm::dvec3 at(ring * std::cos(turn), ring * std::sin(turn), 0);
+        return Receiver{at, glm::vec3(-std::cos(turn), -std::sin(turn), 0)};
+      });
   const auto ours = values(scene.shade(receivers, white_sky), brightness);
   const auto discs = values(scene.trace(receivers, 256, white_sky), brightness);
   const auto truth = grey(ours.size(), 0);
   return {.figures = {{"sky that leaks in, largest", largest_difference(ours, truth), 0.025},
                       {"sky that leaks in, mean", mean_value(ours), 0.008},
                       {"the same between the discs themselves, mean", mean_value(discs), 0.004}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// A bright sheet of one side, seen from behind.
@@ -52,21 +53,22 @@ Outcome behind_a_sheet(const Lab& lab) {
   std::vector<Surfel> surfels;
   add_rectangle(surfels, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0.02, glm::vec3(1));
   const SmallScene scene(lab, surfels);
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    const double lean = 2.5 * u - 1.25;
-    return Receiver{{u, 0, -0.1 - 2 * v}, glm::vec3(std::sin(lean), 0, std::cos(lean))};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        const double lean = 2.5 * u - 1.25;
+        return Receiver{{u, 0, -0.1 - 2 * v}, glm::vec3(std::sin(lean), 0, std::cos(lean))};
+      });
   const auto ours = values(scene.shade(receivers), brightness);
   const auto truth = grey(ours.size(), 0);
   return {.figures = {{"light through the back", largest_difference(ours, truth), 0}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// A room whose walls shine within and are black outside, as two sheets of no thickness, turned.
 Outcome two_sides(const Lab& lab) {
   constexpr double kSpacing = 0.02;
   constexpr unsigned kRows = 8;
-  Outcome outcome{.field = {.width = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong}};
   for (const double degrees : {0.0, 15.0, 30.0, 45.0}) {
     const glm::dmat3 turn(glm::rotate(glm::rotate(glm::dmat4(1), glm::radians(degrees), {0, 1, 0}),
                                       glm::radians(degrees), {1, 0, 0}));
@@ -91,7 +93,7 @@ Outcome two_sides(const Lab& lab) {
     }
     const SmallScene scene(lab, surfels);
     // Half of the rows on the floor within, half below it outside, looking up
-    const auto receivers = receivers_on_grid(kSide, kRows, [&](double u, double v) {
+    const auto receivers = receivers_on_grid(kReceiversAlong, kRows, [&](double u, double v) {
       const double height = v < 0.5 ? -0.98 : -1.02;
       const glm::dvec3 at(1.8 * u - 0.9, height, 3.2 * (v < 0.5 ? v : v - 0.5) - 0.8);
       return Receiver{turn * at, glm::vec3(turn * glm::dvec3(0, 1, 0))};
@@ -122,7 +124,7 @@ Mesh box_of_thickness(float thickness) {
 Outcome coffin(const Lab& lab) {
   constexpr std::uint64_t kPoints = 30'000;
   constexpr unsigned kRows = 6;
-  Outcome outcome{.field = {.width = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong}};
   Random random(23);
   const double spacing = std::sqrt(24.0 / kPoints);
   LightRig lights;
@@ -135,7 +137,7 @@ Outcome coffin(const Lab& lab) {
     const glm::mat3 rotation = share == 1.0 ? glm::mat3(1) : random.rotation();
     turn(mesh, rotation);
     const SmallScene scene(lab, mesh, lights, kPoints);
-    const auto receivers = receivers_on_grid(kSide, kRows, [&](double u, double v) {
+    const auto receivers = receivers_on_grid(kReceiversAlong, kRows, [&](double u, double v) {
       // On the floor and on a wall, up to a spacing from the edges
       const bool floor = v < 0.5;
       const double along = 1.96 * u - 0.98, across = 3.8 * (floor ? v : v - 0.5) - 0.95;
@@ -168,7 +170,7 @@ Outcome coffin(const Lab& lab) {
 Outcome thin_walls(const Lab& lab) {
   constexpr double kSpacing = 0.03, kRadius = kSpacing * 0.7071067811865476;
   constexpr unsigned kRows = 6;
-  Outcome outcome{.field = {.width = kSide}};
+  Outcome outcome{.field = {.width = kReceiversAlong}};
   for (const double radii : {10.0, 3.0, 1.0, 0.3, 0.1}) {
     const double half = 0.5 * radii * kRadius;
     std::vector<Surfel> surfels;
@@ -176,7 +178,7 @@ Outcome thin_walls(const Lab& lab) {
     add_rectangle(surfels, {-3, -3, -half}, {0, 6, 0}, {6, 0, 0}, kSpacing * 1.07, glm::vec3(0));
     const SmallScene scene(lab, surfels);
     // Half of the rows above the white side, half below the black one; all look at the wall
-    const auto receivers = receivers_on_grid(kSide, kRows, [&](double u, double v) {
+    const auto receivers = receivers_on_grid(kReceiversAlong, kRows, [&](double u, double v) {
       const double side = v < 0.5 ? 1 : -1, away = 0.01 + 0.05 * u;
       return Receiver{{2 * u - 1, v, side * (half + away)}, glm::vec3(0, 0, -side)};
     });
@@ -204,9 +206,10 @@ Outcome slit(const Lab& lab) {
   LightRig lights;
   lights.sky.radiance = glm::vec3(kSky);
   const SmallScene scene(lab, mesh, lights, 60'000);
-  const auto receivers = receivers_on_grid(kSide, kSide, [](double u, double v) {
-    return Receiver{{1.8 * u - 0.9, 1.8 * v - 0.9, 0.003}, {0, 0, 1}};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [](double u, double v) {
+        return Receiver{{1.8 * u - 0.9, 1.8 * v - 0.9, 0.003}, {0, 0, 1}};
+      });
   const auto ours =
       values(scene.shade(receivers, [](const glm::vec3&) { return glm::vec3(kSky); }), brightness);
   const std::array<glm::dvec3, 4> opening{
@@ -217,7 +220,7 @@ Outcome slit(const Lab& lab) {
   return {.figures = {{"light, RMS error over its mean", relative_rms(ours, truth), 0.65},
                       {"light, error of its mean",
                        std::abs(mean_value(ours) / mean_value(truth) - 1), 0.45}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 /// A bush of leaves, each a small card of two sides, above a ground.
@@ -237,9 +240,10 @@ Outcome foliage(const Lab& lab) {
   lights.sky.radiance = glm::vec3(1);
   const SmallScene scene(lab, mesh, lights, 40'000);
   const double lift = 0.15 * scene.radius();
-  const auto receivers = receivers_on_grid(kSide, kSide, [&](double u, double v) {
-    return Receiver{{2.4 * u - 1.2, 2.4 * v - 1.2, lift}, {0, 0, 1}};
-  });
+  const auto receivers =
+      receivers_on_grid(kReceiversAlong, kReceiversAlong, [&](double u, double v) {
+        return Receiver{{2.4 * u - 1.2, 2.4 * v - 1.2, lift}, {0, 0, 1}};
+      });
   const auto shaded = scene.shade(receivers, white_sky);
   const auto traced = trace_at_mesh(lab, mesh, lights, receivers, 1024);
   const auto ours = values(shaded, brightness), truth = values(traced, brightness);
@@ -247,7 +251,7 @@ Outcome foliage(const Lab& lab) {
   return {.figures = {{"occlusion, mean error", std::abs(mean_value(open) - mean_value(truly_open)),
                        0.015},
                       {"light, RMS error over its mean", relative_rms(ours, truth), 0.02}},
-          .field = {kSide, kSide, ours, truth}};
+          .field = {kReceiversAlong, kReceiversAlong, ours, truth}};
 }
 
 constexpr std::array kWallRows = std::to_array<Row>({
