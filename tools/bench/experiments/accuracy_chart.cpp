@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include "tools/bench/experiments/experiment.h"
+
 namespace ptc::bench {
 namespace {
 
@@ -57,9 +59,8 @@ std::vector<ChartPanel> panels_of(const SceneAccuracy& scene, const ReferenceNot
   std::vector<ChartPanel> panels;
   for (const Measure& measure : shown) {
     // Draw one curve for each method
-    ChartPanel panel{.title = title + measure.title,
-                     .x_label = "CPU time per receiver, \u00b5s",
-                     .y_label = measure.label};
+    ChartPanel panel{
+        .title = title + measure.title, .x_label = kTimePerReceiver, .y_label = measure.label};
     for (const char* method : kMethods) {
       ChartSeries series{.name = legend_name(method)};
       for (const AccuracyRow& row : scene.rows) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -11,6 +12,9 @@
 #include "engine/pipeline/run.h"
 
 namespace ptc::bench {
+
+/// Points up to which the tree of a container that was built is built again, to check it.
+inline constexpr std::uint64_t kVerifiedWhole = 2'000'000;
 
 /// The base of a run that measures rows of a table. All arguments of the constructor must outlive
 /// it.

@@ -30,9 +30,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kBuildVerifiedWhole =
-    2'000'000;  // points up to which the tree is built again
-
 /// The records of a city in a file, and what a build must know about them.
 struct Input {
   RecordFile file;
@@ -170,7 +167,7 @@ class BuildRun : BenchRun<BuildBenchOptions, BuildRow> {
   /// @throws DataError otherwise
   void require_right(const Input& input, const std::string& profile, Built& built) {
     const VerifyLevel level =
-        input.file.records() <= kBuildVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
+        input.file.records() <= kVerifiedWhole ? VerifyLevel::rebuild : VerifyLevel::payload;
     Progress silent;
     const VerifyReport report =
         verify_container(target_, {.level = level, .threads = run_.threads}, silent);

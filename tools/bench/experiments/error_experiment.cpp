@@ -117,7 +117,7 @@ Chart chart_of(const std::vector<SceneErrors>& scenes) {
                    .x_label = "error asked, %",
                    .y_label = "error measured, %"};
   ChartPanel ladder_panel{.title = "Error against time at all settings",
-                          .x_label = "CPU time per receiver, \u00b5s",
+                          .x_label = kTimePerReceiver,
                           .y_label = "RMS error, % of the mean"};
   ChartSeries limit{.name = "asked", .dashed = true};
   Chart chart{.title = "Measured error against the error asked with --error", .columns = 2};

@@ -16,6 +16,9 @@
 
 namespace ptc::bench {
 
+/// The label of an axis.
+inline constexpr char kTimePerReceiver[] = "CPU time per receiver, \u00b5s";
+
 /// Where and how an experiment runs.
 struct Bench {
   std::filesystem::path work;  ///< directory for its temporary files, which are gone at the end

@@ -42,7 +42,7 @@ Report report_of(const std::vector<std::vector<GlossyRow>>& scenes, unsigned run
   for (const auto& scene : scenes) {
     if (scene.empty()) continue;
     ChartPanel panel{.title = scene.front().scene,
-                     .x_label = "CPU time per receiver, \u00b5s",
+                     .x_label = kTimePerReceiver,
                      .y_label = "radiance RMS error, %"};
     for (const GlossyRow& row : scene) {
       const std::string name = fmt::format("{}, roughness {:.1f}", row.method, row.roughness);

@@ -9,7 +9,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr char kGrowthTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kGrowthReading[] =
     "Time per receiver of PTCX, against the number of surfels, the solid angle of the gather, the "
     "sheets that lie behind each other, and the size of the page cache. Receivers are points of "
@@ -52,7 +51,7 @@ void add_point(ChartPanel& panel, const std::string& name, double x, double y,
 /// Makes a panel of the time of PTCX, and of the time of Embree at the same error.
 ChartPanel time_panel(const std::vector<GrowthRow>& rows, const std::string& name,
                       const char* title, const char* x_label) {
-  ChartPanel panel{.title = title, .x_label = x_label, .y_label = kGrowthTime};
+  ChartPanel panel{.title = title, .x_label = x_label, .y_label = kTimePerReceiver};
   for (const GrowthRow& row : rows) {
     if (row.panel != name) continue;
     const std::string error =
@@ -83,7 +82,7 @@ Chart chart_of(const std::vector<GrowthRow>& rows) {
   add_panel(chart, time_panel(rows, "surfels", "Surfels", "surfels of the city"));
   add_panel(chart, time_panel(rows, "solid-angle", "Solid angle", "solid angle, sr"));
   add_panel(chart, time_panel(rows, "depth", "Depth complexity", "sheets above the ground"));
-  add_panel(chart, cap_panel(rows, "Page cache: CPU time", kGrowthTime,
+  add_panel(chart, cap_panel(rows, "Page cache: CPU time", kTimePerReceiver,
                              [](const GrowthRow& r) { return r.us.median; }));
   add_panel(chart, cap_panel(rows, "Page cache: wall time", "wall time per receiver, \u00b5s",
                              [](const GrowthRow& r) { return r.wall_us.median; }));

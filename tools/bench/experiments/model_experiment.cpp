@@ -19,7 +19,6 @@ namespace {
 
 using ModelMeasure = std::function<double(const ModelRow&)>;
 
-constexpr char kModelTime[] = "CPU time per receiver, \u00b5s";
 constexpr char kError[] = "RMS error, % of the mean";
 constexpr char kModelReading[] =
     "What each part of the model costs, in bytes and time, and is worth, in error. Errors are root "
@@ -128,7 +127,7 @@ ChartPanel payloads_over_bytes(const SceneModel& scene, const char* what,
 ChartPanel payloads_over_time(const SceneModel& scene, const char* what,
                               const ModelMeasure& error) {
   ChartPanel panel{
-      .title = fmt::format("Payload: {}", what), .x_label = kModelTime, .y_label = kError};
+      .title = fmt::format("Payload: {}", what), .x_label = kTimePerReceiver, .y_label = kError};
   for (const ModelRow& row : scene.rows) {
     if (row.axis != "payload" || row.form != "stored") continue;
     series_of(panel, row.variant, false)
@@ -181,9 +180,9 @@ Chart chart_of(const SceneModel& scene) {
            payloads_over_time(scene, "occlusion", occlusion),
            gathers_over(scene, "leaf", "Points in a leaf: bytes", "bytes per point, nodes included",
                         bytes),
-           gathers_over(scene, "leaf", "Points in a leaf: time", kModelTime, time),
-           gathers_over(scene, "directions", "Directions: pixels along a cube edge", kModelTime,
-                        time),
+           gathers_over(scene, "leaf", "Points in a leaf: time", kTimePerReceiver, time),
+           gathers_over(scene, "directions", "Directions: pixels along a cube edge",
+                        kTimePerReceiver, time),
            pages(scene)}) {
     add_panel(chart, std::move(panel));
   }

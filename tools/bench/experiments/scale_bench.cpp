@@ -28,8 +28,6 @@
 namespace ptc::bench {
 namespace {
 
-constexpr std::uint64_t kScaleVerifiedWhole =
-    2'000'000;  // points up to which the tree is built again
 // Bytes of one memcpy, far more than the caches of processors hold.
 constexpr std::size_t kCopiedBytes = std::size_t{64} << 20;
 
@@ -115,7 +113,7 @@ class ScaleRun : BenchRun<ScaleOptions, ScaleRow> {
     const std::uint64_t made = report.superblock->points;
     // Build the tree of the first container again, unless it is large
     if (first) {
-      if (made <= kScaleVerifiedWhole) {
+      if (made <= kVerifiedWhole) {
         verification.level = VerifyLevel::rebuild;
         report = verify_container(scene_, verification, silent);
         require_whole(report, points, runs.built.sort.points);
