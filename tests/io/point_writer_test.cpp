@@ -8,6 +8,8 @@
 
 #include "engine/base/error.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/image/srgb.h"
+#include "format/bytes.h"
 #include "tests/io/files.h"
 #include "tests/io/writer_inputs.h"
 
@@ -214,6 +216,81 @@ TEST_CASE("point writers: where the stored colour is not known, viewers show the
         unknown_losses(format, info) ==
         std::vector<std::string>{"Points without a colour of their own get that of their albedo."});
   }
+}
+
+TEST_CASE("point writers: a colour of 16 bits comes back to the last bit, whatever the format",
+          "[io][writers]") {
+  const test::TemporaryDirectory scratch;
+  const float rounding = GENERATE(0.0F, 1 / 510.0F);  // of the albedo, as in a container
+  constexpr std::size_t kPoints = 3000;
+  std::vector<Surfel> surfels = surfels_of(static_cast<int>(kPoints));
+  std::vector<std::byte> rows;
+  std::vector<std::array<std::uint16_t, 3>> colours(kPoints);
+  for (std::size_t i = 0; i < kPoints; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      colours[i][k] = static_cast<std::uint16_t>((i * 3 + k) * 7919 % 65536);
+      append_value(rows, colours[i][k]);
+      surfels[i].albedo[static_cast<int>(k)] =
+          static_cast<float>(srgb_to_linear(colours[i][k] / 65535.0));
+    }
+  }
+  PointWriteInfo info = plain_info(surfels);
+  info.has_albedo = true;
+  info.channels = {channel("rgb", ChannelType::u16, 3, ChannelRole::colour)};
+  info.channels[0].colour_space = ColourSpace::srgb;
+  struct Case {
+    const char* name;
+    OutputFormat format;
+    bool keeps_channel;  // else the albedo gives the colour back
+  };
+  for (const Case& c :
+       {Case{"a.bgeo", OutputFormat::bgeo, false}, Case{"a.pcd", OutputFormat::pcd, true},
+        Case{"a.ply", OutputFormat::ply, true}, Case{"a.ptc", OutputFormat::ptc, false}}) {
+    CAPTURE(c.name);
+    std::vector<Surfel> rounded = surfels;
+    for (Surfel& surfel : rounded)
+      surfel.albedo = glm::max(surfel.albedo - glm::vec3(rounding), glm::vec3(0));
+    write_points(scratch / c.name, c.format, info, rounded, rows);
+    const PointFile file = open_points(scratch / c.name);
+    std::vector<Surfel> back(kPoints + 1);
+    REQUIRE(file.source->next(back) == kPoints);
+    if (c.keeps_channel) {
+      REQUIRE(file.info.channels.size() == 1);
+      CHECK(file.info.channels[0].name == "rgb");
+      CHECK(file.info.channels[0].type == ChannelType::u16);
+      CHECK(std::ranges::equal(file.source->attributes(), rows));
+      continue;
+    }
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto light = static_cast<double>(back[i].albedo[static_cast<int>(k)]);
+        wrong += std::lround(65535 * linear_to_srgb(light)) == colours[i][k] ? 0U : 1U;
+      }
+    }
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("point writers: bytes of a colour in wider fields are written as a colour of bytes",
+          "[io][writers]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(1);
+  PointWriteInfo info = plain_info(surfels);
+  info.channels = {channel("rgb", ChannelType::u16, 3, ChannelRole::colour)};
+  info.channels[0].colour_space = ColourSpace::srgb;
+  info.channels[0].scale = kByteScale;
+  std::vector<std::byte> rows;
+  for (const std::uint16_t v : std::initializer_list<std::uint16_t>{1, 128, 255})
+    append_value(rows, v);
+  write_points(scratch / "a", OutputFormat::ply, info, surfels, rows);
+  const std::string bytes = slurp(scratch / "a");
+  CHECK_THAT(bytes, Contains("double z\nproperty uchar red\nproperty uchar green\n"
+                             "property uchar blue\nend_header\n"));
+  CHECK_THAT(bytes, EndsWith("\x01\x80\xff"));
+  info.channels[0].no_value = 1;
+  CHECK(unknown_losses(OutputFormat::ply, info) ==
+        std::vector<std::string>{"Points without a colour of their own get that of their albedo."});
 }
 
 TEST_CASE("point writers: a surface's colour with a scale is shown with white at 1",

@@ -263,6 +263,34 @@ TEST_CASE("ptc writer: the header and the points lie where the format has them",
   CHECK(bytes.substr(header.size() + second.size()) == second);
 }
 
+TEST_CASE("ptc writer: what is reflected, emitted and coloured comes back apart",
+          "[io][writers][ptc]") {
+  const test::TemporaryDirectory scratch;
+  const std::vector<Surfel> surfels = surfels_of(3);
+  PointWriteInfo info = full_info(surfels);
+  write_points(scratch / "a.ptc", OutputFormat::ptc, info, surfels);
+  const PointFile file = open_points(scratch / "a.ptc");
+  CHECK(file.info.has_albedo);
+  CHECK(file.info.has_emission);
+  std::vector<Surfel> back(4);
+  REQUIRE(file.source->next(back) == 3);
+  for (std::size_t i = 0; i < surfels.size(); ++i) {
+    CHECK(back[i].radiance == surfels[i].radiance);
+    CHECK(back[i].albedo == surfels[i].albedo);
+    CHECK(back[i].emission == surfels[i].emission);
+  }
+  // An area that the points had in a PTC stays
+  info.channels = {{.name = "_area", .type = ChannelType::f32}};
+  std::vector<std::byte> rows;
+  for (const float area : {3.0F, 4.0F, 5.0F}) append_value(rows, area);
+  write_points(scratch / "b.ptc", OutputFormat::ptc, info, surfels, rows);
+  const PointFile again = open_points(scratch / "b.ptc");
+  REQUIRE(again.info.channels.size() == 1);
+  CHECK(again.info.channels[0].name == "_area");
+  REQUIRE(again.source->next(back) == 3);
+  CHECK(std::ranges::equal(again.source->attributes(), rows));
+}
+
 TEST_CASE("ptc writer: normals read back within the steps of their angles", "[io][writers][ptc]") {
   const test::TemporaryDirectory scratch;
   std::vector<Surfel> surfels;

@@ -81,7 +81,7 @@ class BgeoWriter : public CheckedWriter {
       : CheckedWriter(info.count, row_bytes(info.channels)),
         info_(info),
         colour_(info),
-        channels_(row_channels(info.channels, taken_)),
+        channels_(colour_.without_stored(row_channels(info.channels, taken_))),
         names_(original_names(info)),
         out_(target) {
     find_colour();

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <string_view>
+#include <utility>
+
+#include <glm/common.hpp>
 
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/points.h"
@@ -59,13 +62,7 @@ DisplayColour::DisplayColour(const PointWriteInfo& info)
 
 glm::vec3 DisplayColour::linear(const Surfel& surfel, const std::byte* row) const {
   if (kind_ == Kind::shown) return shown_light(row);
-  if (kind_ != Kind::stored || (surfels_have_albedo_ && !chosen_) || !knows(row))
-    return surfel.albedo;
-  const std::array<std::uint16_t, 3> stored = stored_values(surfel, row);
-  glm::vec3 light;
-  for (std::size_t i = 0; i < 3; ++i)
-    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(stored[i] / stored_white()));
-  return light;
+  return shows_stored(surfel, row) ? stored_light(row) : surfel.albedo;
 }
 
 std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std::byte* row) const {
@@ -73,27 +70,44 @@ std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std
 }
 
 std::array<std::uint8_t, 3> DisplayColour::bytes(const Surfel& surfel, const std::byte* row) const {
-  constexpr float kRounding = 0.003F;  // of an albedo in a container
-  std::array<std::uint8_t, 3> bytes{};
-  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8 && knows(row)) {
-    bool own = true;
-    for (std::size_t i = 0; i < 3; ++i) {
-      bytes[i] = std::to_integer<std::uint8_t>(*source_->at(row, i));
-      const auto light = static_cast<float>(srgb_to_linear(bytes[i] / 255.0));
-      own = own && std::abs(light - surfel.albedo[static_cast<int>(i)]) <= kRounding;
-    }
-    if (own || chosen_ || !surfels_have_albedo_) return bytes;
-  }
   const std::array<std::uint16_t, 3> wide = srgb(surfel, row);
+  std::array<std::uint8_t, 3> bytes{};
   for (std::size_t i = 0; i < 3; ++i)
     bytes[i] = static_cast<std::uint8_t>((wide[i] * 255U + 32767) / 65535);  // to the nearest
   return bytes;
 }
 
 std::vector<RowChannel> DisplayColour::without_bytes(std::vector<RowChannel> channels) const {
-  if (kind_ == Kind::stored && source_->channel.type == ChannelType::u8)
+  return kind_ == Kind::stored && stores_bytes() ? without_stored(std::move(channels)) : channels;
+}
+
+std::vector<RowChannel> DisplayColour::without_stored(std::vector<RowChannel> channels) const {
+  if (kind_ == Kind::stored)
     std::erase_if(channels, [&](const RowChannel& c) { return c.offset == source_->offset; });
   return channels;
+}
+
+bool DisplayColour::stores_bytes() const noexcept {
+  return source_->channel.type == ChannelType::u8 || source_->channel.scale == kByteScale;
+}
+
+bool DisplayColour::shows_stored(const Surfel& surfel, const std::byte* row) const {
+  constexpr float kRounding = 0.003F;  // of an albedo in a container
+  if (kind_ != Kind::stored || !knows(row)) return false;
+  if (chosen_ || !surfels_have_albedo_) return true;
+  const glm::vec3 apart = glm::abs(stored_light(row) - surfel.albedo);
+  return std::max({apart.r, apart.g, apart.b}) <= kRounding;
+}
+
+glm::vec3 DisplayColour::stored_light(const std::byte* row) const {
+  const double white = stores_bytes() ? 255 : 65535;
+  glm::vec3 light;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto value =
+        static_cast<double>(load_integer(source_->channel.type, source_->at(row, i)));
+    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(std::min(value / white, 1.0)));
+  }
+  return light;
 }
 
 bool DisplayColour::knows(const std::byte* row) const noexcept {
@@ -103,8 +117,7 @@ bool DisplayColour::knows(const std::byte* row) const noexcept {
 std::array<std::uint16_t, 3> DisplayColour::stored_values(const Surfel& surfel,
                                                           const std::byte* row) const {
   if (!knows(row)) return to_srgb(surfel.albedo, stored_white());
-  const bool wide = source_->channel.type == ChannelType::u16 && source_->channel.scale == 1;
-  const std::int64_t most = wide ? 65535 : 255;
+  const std::int64_t most = stores_bytes() ? 255 : 65535;
   const std::int64_t factor = static_cast<std::int64_t>(stored_white()) / most;
   std::array<std::uint16_t, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {

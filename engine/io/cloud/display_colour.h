@@ -31,17 +31,22 @@ class DisplayColour {
   [[nodiscard]] const RowChannel* stored() const noexcept {
     return kind_ == Kind::stored ? &*source_ : nullptr;
   }
+  /// Says whether the numbers of stored(), which is not null, are bytes, even in wider fields.
+  [[nodiscard]] bool stores_bytes() const noexcept;
   /// Says whether the colour takes the place of the albedo.
   [[nodiscard]] bool hides_albedo() const noexcept { return chosen_; }
-  /// Returns the colour, linear, each component in [0, 1].
+  /// Returns the colour, linear, each component in [0, 1]: that of stored() where the point's
+  /// albedo came from it. Its floats give the numbers of stored() back, those of 16 bits, too.
   [[nodiscard]] glm::vec3 linear(const Surfel& surfel, const std::byte* row) const;
   /// Returns the colour on the sRGB curve, 65535 for 1.
   [[nodiscard]] std::array<std::uint16_t, 3> srgb(const Surfel& surfel, const std::byte* row) const;
-  /// Returns the colour on the sRGB curve in 8 bits: those of stored(), if it has as many and the
-  /// point's albedo came from them.
+  /// Returns the colour on the sRGB curve in 8 bits: those of stored(), if its numbers are bytes
+  /// and the point's albedo came from them.
   [[nodiscard]] std::array<std::uint8_t, 3> bytes(const Surfel& surfel, const std::byte* row) const;
   /// Returns channels without the one whose values bytes() has.
   [[nodiscard]] std::vector<RowChannel> without_bytes(std::vector<RowChannel> channels) const;
+  /// Returns channels without the one whose values linear() has.
+  [[nodiscard]] std::vector<RowChannel> without_stored(std::vector<RowChannel> channels) const;
   /// Returns the values of stored(), those of 8 bits 257-fold, so that 65535 is white. Points that
   /// come from a LAS file with bytes in its fields of 16 bits keep those. Where values are not
   /// known, the albedo takes their place.
@@ -53,6 +58,9 @@ class DisplayColour {
 
   /// Says whether the numbers of stored() are known of a point.
   [[nodiscard]] bool knows(const std::byte* row) const noexcept;
+  /// Says whether the numbers of stored() are the colour of a point.
+  [[nodiscard]] bool shows_stored(const Surfel& surfel, const std::byte* row) const;
+  [[nodiscard]] glm::vec3 stored_light(const std::byte* row) const;
   /// Returns which of stored_values() is white.
   [[nodiscard]] double stored_white() const noexcept;
   [[nodiscard]] glm::vec3 shown_light(const std::byte* row) const;

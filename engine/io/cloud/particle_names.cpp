@@ -27,7 +27,9 @@ constexpr std::array kKnown = std::to_array<Known>({
     {"Ci", {"radiance_r", "radiance_g", "radiance_b"}},
     {"radiance", {"radiance_r", "radiance_g", "radiance_b"}},
     {"emission", {"emission_r", "emission_g", "emission_b"}},
+    {"_emission", {"emission_r", "emission_g", "emission_b"}},
     {"albedo", {"albedo_r", "albedo_g", "albedo_b"}},
+    {"_albedo", {"albedo_r", "albedo_g", "albedo_b"}},
 });
 
 }  // namespace

@@ -30,6 +30,7 @@ constexpr Names kAlbedo = {"albedo_r", "albedo_g", "albedo_b"};
 constexpr std::array<Names, 2> kColour = {
     {{"red", "green", "blue"}, {"diffuse_red", "diffuse_green", "diffuse_blue"}}};
 constexpr Names kShortColour = {"r", "g", "b"};
+constexpr Names kStoredColour = {"rgb_r", "rgb_g", "rgb_b"};  // the channel `rgb` of our writers
 constexpr std::array<std::string_view, 2> kRadius = {"radius", "scalar_radius"};
 
 bool is_float(ChannelType type) {
@@ -165,14 +166,16 @@ void PointLayout::find_colours(const LayoutRules& rules) {
   // those of colours.
   std::optional<Indices> indices = find_triple(kColour[0]);
   if (!indices) indices = find_triple(kColour[1]);
-  const auto is_short_colour = [&](std::string_view name) {
-    const auto index = find(name);
-    if (!index) return false;
-    const ChannelType type = fields_[*index].channel.type;
-    return type == ChannelType::u8 || type == ChannelType::u16;
+  const auto are_colours = [&](const Names& names) {
+    return std::ranges::all_of(names, [&](std::string_view name) {
+      const auto index = find(name);
+      if (!index) return false;
+      const ChannelType type = fields_[*index].channel.type;
+      return type == ChannelType::u8 || type == ChannelType::u16;
+    });
   };
-  if (!indices && std::ranges::all_of(kShortColour, is_short_colour))
-    indices = find_triple(kShortColour);
+  if (!indices && are_colours(kShortColour)) indices = find_triple(kShortColour);
+  if (are_colours(kStoredColour)) indices = find_triple(kStoredColour);
   const auto is_number = [&](std::string_view name) {
     const auto index = find(name);
     return index && is_float(fields_[*index].channel.type);

@@ -66,7 +66,8 @@ class PointLayout {
   /// named x y z; nx ny nz or normal_x normal_y normal_z; radius or scalar_radius; radiance_r
   /// radiance_g radiance_b; emission_r emission_g emission_b; as floats albedo_r
   /// albedo_g albedo_b, else red green blue or diffuse_red diffuse_green diffuse_blue or, as
-  /// integers of 8 or 16 bits, r g b.
+  /// integers of 8 or 16 bits, r g b. Integers of 8 or 16 bits rgb_r rgb_g rgb_b take the place of
+  /// those colours.
   /// @throws DataError that names the file when it has no x, y and z
   PointLayout(const std::filesystem::path& path, std::span<const RecordField> fields,
               const LayoutRules& rules);

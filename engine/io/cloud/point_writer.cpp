@@ -139,15 +139,18 @@ std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info)
 
 std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInfo& info) {
   if (format == OutputFormat::las) return las_unknown_losses(info);
-  // In PLY and PCD, a colour of 8 bits is the one that viewers show
-  const bool packs_colour = format == OutputFormat::ply || format == OutputFormat::pcd;
+  // The colour that viewers show takes the place of the channel: in PLY and PCD, one of bytes; in
+  // BGEO and PTC, where it is of floats, any
   const DisplayColour colour(info);
+  const bool has_bytes = format == OutputFormat::ply || format == OutputFormat::pcd;
+  const bool has_floats = format == OutputFormat::bgeo || format == OutputFormat::ptc;
+  const bool packs_colour =
+      colour.stored() != nullptr && (has_floats || (has_bytes && colour.stores_bytes()));
   std::vector<std::string> values, sentences;
   for (const Channel& channel : info.channels) {
     if (!channel.no_value || channel_bytes(channel.type) == 0) continue;
     if (format == OutputFormat::xyz && is_scaled(channel)) continue;  // NaN says so
-    const bool packed = packs_colour && channel.type == ChannelType::u8 && colour.stored() &&
-                        colour.stored()->channel.name == channel.name;
+    const bool packed = packs_colour && colour.stored()->channel.name == channel.name;
     if (packed || (format == OutputFormat::bgeo && is_linear_colour(channel))) {
       sentences.emplace_back(kAlbedoAsColour);
     } else if (const std::string value = number_text(channel.type, *channel.no_value);

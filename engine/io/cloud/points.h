@@ -34,6 +34,8 @@ struct PointFileInfo {
   bool has_radiance = false;  ///< otherwise radiance is 0
   bool has_emission = false;  ///< otherwise emission is 0
   bool has_albedo = false;    ///< the file has colours; otherwise albedo is 0.5
+  /// The format has a normal and a radius for every point; where all of them are 0, there are none.
+  bool zeros_mean_none = false;
   /// What the file records of a point beyond its surfel, in the order of PointSource::attributes().
   /// The group of a channel means nothing here.
   std::vector<Channel> channels;
@@ -76,7 +78,9 @@ struct PointFile {
 /// radius or scalar_radius; radiance_r radiance_g radiance_b; emission_r emission_g emission_b; red
 /// green blue or diffuse_red diffuse_green diffuse_blue or, as integers, r g b. The last are the
 /// albedo: integers are sRGB (8 bits; 16 for short types) and are kept in the channel `rgb`, too;
-/// floats are linear in [0, 1]. All other properties become channels of their type. Extra bytes of
+/// floats are linear in [0, 1]. Integers rgb_r rgb_g rgb_b are the channel `rgb` as PTCX writes it
+/// beside a colour of fewer bits, whose place they take. All other properties become channels of
+/// their type. Extra bytes of
 /// LAS are such properties; there NormalX NormalY NormalZ are a normal, too, and plain integers are
 /// no part of the surfel.
 ///

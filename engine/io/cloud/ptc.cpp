@@ -13,9 +13,12 @@
 //   188      a line "TYPE NAME" for each channel
 //            points: f32[3] position, u16[2] normal, f32 radius, f32 of all channels
 //
-// packed_normal.h says what the two numbers of a normal mean.
-#include <array>
+// packed_normal.h says what the two numbers of a normal mean. Where a file has `_emission`, as PTCX
+// writes it, it is part of `_radiosity`, and the rest is what a disc reflects.
+#include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <optional>
 
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/packed_normal.h"
@@ -62,6 +65,7 @@ class PtcSource : public RecordSource {
     layout().describe(info);
     info.count = count_;
     info.notes = notes_;
+    info.zeros_mean_none = true;
     return info;
   }
 
@@ -120,8 +124,10 @@ class PtcSource : public RecordSource {
       }
       if (type == "vector") channel.role = ChannelRole::vector;
       if (type == "normal") channel.role = ChannelRole::direction;
-      const std::size_t before = fields_.size();
-      add_attribute(channel, kPackedCore + found * sizeof(float), fields_);
+      const std::size_t before = fields_.size(), offset = kPackedCore + found * sizeof(float);
+      add_attribute(channel, offset, fields_);
+      if (channel.name == "_radiosity" && components == 3) radiosity_ = offset;
+      if (channel.name == "_emission" && components == 3) emission_ = offset;
       if (!fields_[before].plain) {
         notes_.push_back("The channel '" + channel.name + "' is taken as radiance or albedo.");
       }
@@ -142,7 +148,18 @@ class PtcSource : public RecordSource {
                                             .z = load<std::uint16_t>(from, kNormalOffset + 2)});
     std::memcpy(packed_.data() + kNormalOffset + sizeof(float), &normal, sizeof normal);
     std::memcpy(packed_.data() + kPackedCore, from + kCoreBytes, floats_ * sizeof(float));
+    if (radiosity_ && emission_) take_emission();
     return packed_.data();
+  }
+
+  // Leaves in `_radiosity` what is reflected.
+  void take_emission() {
+    for (std::size_t i = 0; i < 3 * sizeof(float); i += sizeof(float)) {
+      std::byte* const at = packed_.data() + *radiosity_ + i;
+      const float rest = load<float>(at, 0) - load<float>(packed_.data(), *emission_ + i);
+      const float reflected = std::max(rest, 0.0F);
+      if (std::isfinite(rest)) std::memcpy(at, &reflected, sizeof reflected);
+    }
   }
 
   void finish_block() override {
@@ -155,8 +172,9 @@ class PtcSource : public RecordSource {
   ByteStream stream_;
   std::uint64_t count_ = 0;
   std::uint32_t channels_ = 0;
-  std::size_t floats_ = 0;           // of all channels in a point
-  std::vector<RecordField> fields_;  // of a packed record
+  std::size_t floats_ = 0;                           // of all channels in a point
+  std::vector<RecordField> fields_;                  // of a packed record
+  std::optional<std::size_t> radiosity_, emission_;  // their offsets in it
   std::vector<std::string> notes_;
   std::vector<std::byte> packed_;  // the point that was read last
   std::uint64_t place_ = 0;        // its offset

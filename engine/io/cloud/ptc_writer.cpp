@@ -9,11 +9,12 @@
 //
 // packed_normal.h says what phi and z of a normal mean. What a disc emits and reflects is
 // `_radiosity`, and its `_area` is that of the square cell of a surfel: the names under which
-// RenderMan looks for them.
-#include <set>
+// RenderMan looks for them. Points that came from a PTC keep the area that they had there.
+#include <algorithm>
 #include <string>
 
 #include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/formats.h"
 #include "engine/io/cloud/packed_normal.h"
 #include "engine/io/cloud/packed_number.h"
@@ -35,7 +36,11 @@ class PtcWriter : public CheckedWriter {
   PtcWriter(const std::filesystem::path& target, const PointWriteInfo& info)
       : CheckedWriter(info.count, row_bytes(info.channels)),
         info_(info),
-        channels_(row_channels(info.channels, {"_area", "_radiosity", "_albedo", "_emission"})),
+        colour_(info),
+        channels_(colour_.without_stored(
+            row_channels(info.channels, {"_radiosity", "_albedo", "_emission"}))),
+        has_own_area_(std::ranges::any_of(channels_,
+                                          [](const RowChannel& row) { return row.name == kArea; })),
         out_(target) {
     declare_variables();
     const std::vector<std::byte> header = make_header();
@@ -46,9 +51,9 @@ class PtcWriter : public CheckedWriter {
  private:
   // Lists the variables; a channel of three is one, the components of others are one each.
   void declare_variables() {
-    if (info_.has_radius) declare("float", "_area", 1);
+    if (makes_area()) declare("float", kArea, 1);
     if (info_.has_radiance || info_.emits) declare("color", "_radiosity", 3);
-    if (info_.has_albedo) declare("color", "_albedo", 3);
+    if (colour_.exists()) declare("color", "_albedo", 3);
     if (info_.emits) declare("color", "_emission", 3);
     for (const RowChannel& channel : channels_) {
       if (channel.channel.components == 3) {
@@ -87,9 +92,9 @@ class PtcWriter : public CheckedWriter {
     put_value(glm::vec3(surfel.position));
     put_value(normal);
     put_value(info_.has_radius ? surfel.radius : 0.0F);
-    if (info_.has_radius) put_value(2 * surfel.radius * surfel.radius);
+    if (makes_area()) put_value(2 * surfel.radius * surfel.radius);
     if (info_.has_radiance || info_.emits) put_value(surfel.outgoing());
-    if (info_.has_albedo) put_value(surfel.albedo);
+    if (colour_.exists()) put_value(colour_.linear(surfel, row));
     if (info_.emits) put_value(surfel.emission);
     for (const RowChannel& channel : channels_) {
       for (std::size_t i = 0; i < channel.channel.components; ++i) {
@@ -104,8 +109,14 @@ class PtcWriter : public CheckedWriter {
     out_.put(&value, sizeof value);
   }
 
+  [[nodiscard]] bool makes_area() const noexcept { return info_.has_radius && !has_own_area_; }
+
+  static constexpr const char* kArea = "_area";
+
   PointWriteInfo info_;
+  DisplayColour colour_;
   std::vector<RowChannel> channels_;
+  bool has_own_area_;      // among the channels
   std::string variables_;  // their declarations
   std::uint32_t variable_count_ = 0;
   std::uint32_t float_count_ = 0;

@@ -46,16 +46,27 @@ void copy_points(PointSource& source, const std::filesystem::path& target, Outpu
   writer->finish();
 }
 
+/// Which parts of a surfel some point has.
+struct SeenParts {
+  bool normals = false;
+  bool radii = false;
+};
+
 /// Counts the points of a source, finds their bounds and measures their channels and what is
 /// rounded of them.
-void measure(PointSource& source, std::optional<PointSurvey>& survey,
-             std::optional<RoundingSurvey>& rounding, PointWriteInfo& info,
-             Progress* progress = nullptr) {
+SeenParts measure(PointSource& source, std::optional<PointSurvey>& survey,
+                  std::optional<RoundingSurvey>& rounding, PointWriteInfo& info,
+                  Progress* progress = nullptr) {
+  SeenParts seen;
   info.count = 0;
   info.bounds = {};
   std::vector<Surfel> block(kCopyBlock);
   while (const std::size_t count = source.next(block)) {
-    for (std::size_t i = 0; i < count; ++i) info.bounds.add(block[i].position);
+    for (std::size_t i = 0; i < count; ++i) {
+      info.bounds.add(block[i].position);
+      seen.normals = seen.normals || block[i].normal != glm::vec3(0);
+      seen.radii = seen.radii || block[i].radius > 0;
+    }
     info.count += count;
     if (survey) survey->add(source.attributes());
     if (rounding) rounding->add(std::span(block).first(count), source.attributes());
@@ -63,6 +74,7 @@ void measure(PointSource& source, std::optional<PointSurvey>& survey,
   }
   if (survey) survey->finish(info);
   if (rounding) info.rounding = rounding->rounding();
+  return seen;
 }
 
 /// Returns what measures the channels of rows; nothing when none is measured.
@@ -225,7 +237,11 @@ PointWriteInfo describe_points(const std::filesystem::path& cloud, const PointFi
   std::optional<RoundingSurvey> rounding;
   if (format && (options.measure_rounding || chooses_positions(*format)))
     rounding.emplace(*format, info);
-  measure(*file.source, survey, rounding, info, &progress);
+  const SeenParts seen = measure(*file.source, survey, rounding, info, &progress);
+  if (file.info.zeros_mean_none) {
+    info.has_normals = seen.normals;
+    info.has_radius = seen.radii;
+  }
   return info;
 }
 
