@@ -223,7 +223,7 @@ void add_unscaled_channels(std::vector<std::string>& losses, const PointWriteInf
 
 void add_lost_crs(std::vector<std::string>& losses, const PointWriteInfo& info) {
   if (!info.text.contains("crs")) return;
-  losses.push_back("The file does not name its coordinate reference system.");
+  losses.emplace_back(kLostCrs);
 }
 
 }  // namespace ptc

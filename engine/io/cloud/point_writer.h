@@ -133,6 +133,9 @@ void check_colour_from(OutputFormat format, const PointWriteInfo& info);
 /// sentence each. Of what was measured (PointWriteInfo::rounding), it says only what is rounded.
 [[nodiscard]] std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info);
 
+/// What losses() says of a coordinate reference system that a format cannot name.
+inline constexpr const char* kLostCrs = "The file does not name its coordinate reference system.";
+
 /// Returns what becomes of values that stand for "not known" where a file of this format cannot say
 /// so, a sentence each. They are among those of losses().
 [[nodiscard]] std::vector<std::string> unknown_losses(OutputFormat format,

@@ -12,7 +12,7 @@ namespace ptc::laz {
 namespace {
 
 // The kind of return r of n, [n][r]. Returns that the format does not allow have kinds as well.
-constexpr std::uint8_t kKind[8][8] = {
+constexpr std::uint8_t kKindOf7Returns[8][8] = {
     {15, 14, 13, 12, 11, 10, 9, 8},  {14, 0, 1, 3, 6, 10, 10, 9},
     {13, 1, 2, 4, 7, 11, 11, 10},    {12, 3, 4, 5, 8, 12, 12, 11},
     {11, 6, 7, 8, 9, 13, 13, 12},    {10, 10, 11, 12, 13, 14, 14, 13},
@@ -53,7 +53,7 @@ const Point10& Point10Decoder::decode(ArithmeticDecoder& in) {
   if (changed != 0) decode_attributes(in, changed);
   const unsigned number = return_number(last_);
   const unsigned count = return_count(last_);
-  const std::size_t kind = kKind[count][number];
+  const std::size_t kind = kKindOf7Returns[count][number];
   const auto level = static_cast<std::size_t>(std::abs(static_cast<int>(count - number)));
   const unsigned single = count == 1 ? 1 : 0;
 
@@ -80,7 +80,7 @@ const Point10& Point10Decoder::decode(ArithmeticDecoder& in) {
 void Point10Decoder::decode_attributes(ArithmeticDecoder& in, unsigned changed) {
   if ((changed & 32) != 0)
     last_.returns = static_cast<std::uint8_t>(in.symbol(returns_[last_.returns]));
-  const std::size_t kind = kKind[return_count(last_)][return_number(last_)];
+  const std::size_t kind = kKindOf7Returns[return_count(last_)][return_number(last_)];
   if ((changed & 16) != 0) {
     intensities_[kind] = static_cast<std::uint16_t>(
         intensity_.decode(in, intensities_[kind], std::min(static_cast<unsigned>(kind), 3U)));

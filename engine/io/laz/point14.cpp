@@ -20,7 +20,7 @@ namespace ptc::laz {
 namespace {
 
 // The kind of return r of n, [n][r].
-constexpr std::uint8_t kKind[16][16] = {
+constexpr std::uint8_t kKindOf15Returns[16][16] = {
     {0, 1, 2, 3, 4, 5, 3, 4, 4, 5, 5, 5, 5, 5, 5, 5},
     {1, 0, 1, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3},
     {2, 1, 2, 4, 4, 4, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3},
@@ -144,7 +144,7 @@ void Point14Decoder::Channel::decode_place(Layers& layers, std::size_t time_bit)
   const unsigned number = laz::return_number(last);
   const unsigned count = laz::return_count(last);
   const unsigned single = count == 1 ? 1 : 0;
-  const std::size_t kind = std::size_t{2} * kKind[count][number] + time_bit;
+  const std::size_t kind = std::size_t{2} * kKindOf15Returns[count][number] + time_bit;
 
   // Decode x and y by the median of recent steps.
   ArithmeticDecoder& in = layers[kReturnsXy].in;

@@ -19,7 +19,6 @@ namespace ptc {
 namespace {
 
 using Corner = MeshSoup::Corner;
-constexpr std::uint32_t kNone = MeshSoup::kNone;
 constexpr std::size_t kBlock = 1 << 12;  // triangles handed on at once
 
 /// Makes the triangles of a soup, in its order.
@@ -78,7 +77,7 @@ class TriangleReader {
     bool any = false, all = true;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t at = of_polygon_[cut[k]].normal;
-      if (at != kNone) triangle.normals[k] = unit_or_missing(normals_[at]);
+      if (at != MeshSoup::kNone) triangle.normals[k] = unit_or_missing(normals_[at]);
       const bool has = triangle.normals[k] != glm::vec3(0);
       any |= has;
       all &= has;
@@ -96,7 +95,7 @@ class TriangleReader {
     bool any = false;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t at = of_polygon_[cut[k]].uv;
-      if (at == kNone) continue;
+      if (at == MeshSoup::kNone) continue;
       any = true;
       triangle.uvs[k] = finite_or_zero(uvs_[at]);
     }

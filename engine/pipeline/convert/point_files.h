@@ -60,8 +60,8 @@ void note_changed_values(const std::filesystem::path& target, const PointWriteIn
                                              Progress& progress);
 
 /// Writes the points of a container with its channels. The ending of the target chooses the
-/// format. The target is published when it is complete, and then opened again: it must have as many
-/// points and the same channels as were written.
+/// format. The target is published when it is complete, and then read again and compared with what
+/// was written (WrittenCheck).
 /// @throws RequestError about `original_order` when the container does not know it, about `target`
 ///         when the format is unknown or cannot hold the points; LimitError; FormatError when the
 ///         container is damaged; std::system_error
@@ -70,9 +70,10 @@ ConvertReport container_to_points(const ContainerReader& container,
                                   const std::filesystem::path& target,
                                   const PointFileOptions& options, Progress& progress);
 
-/// Writes the points of a cloud in another format, in their order. The cloud is read twice.
-/// @throws DataError when the cloud breaks its format or changes between the passes; RequestError
-///         as container_to_points(); std::system_error
+/// Writes the points of a cloud in another format, in their order. The cloud is read twice, and the
+/// target once.
+/// @throws DataError when the cloud breaks its format or changes between the passes, or when the
+///         target is not what was written; RequestError as container_to_points(); std::system_error
 /// Memory: below kBufferBytes.
 ConvertReport cloud_to_points(const std::filesystem::path& cloud,
                               const std::filesystem::path& target, const PointFileOptions& options,
