@@ -30,8 +30,8 @@ class Caps(ProgramTest):
         self.assertLessEqual(usage.ru_maxrss * 1024, cap * MIB + SLACK, f"{command}: {text}")
         return text
 
-    def write_waves(self, path, side):
-        """Writes a PLY of 2 side^2 triangles."""
+    def write_waves(self, path, side, ground=0):
+        """Writes a PLY of 2 side^2 triangles over the unit square, and one more below it, so many units wide."""
         places, faces = array.array("f"), bytearray()
         for i in range(side + 1):
             for k in range(side + 1):
@@ -41,8 +41,11 @@ class Caps(ProgramTest):
                 a, b = i * (side + 1) + k, (i + 1) * (side + 1) + k
                 for corners in ((a, a + 1, b + 1), (a, b + 1, b)):
                     faces += b"\x03" + array.array("i", corners).tobytes()
-        header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {(side + 1) ** 2}\nproperty float x\n"
-                  f"property float y\nproperty float z\nelement face {2 * side ** 2}\n"
+        if ground:
+            faces += b"\x03" + array.array("i", (len(places) // 3 + i for i in range(3))).tobytes()
+            places.extend((-ground, -0.1, -ground, -ground, -0.1, ground, ground, -0.1, -ground))
+        header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(places) // 3}\nproperty float x\n"
+                  f"property float y\nproperty float z\nelement face {len(faces) // 13}\n"
                   "property list uchar int vertex_indices\nend_header\n")
         path.write_bytes(header.encode() + places.tobytes() + faces)
 
@@ -52,6 +55,12 @@ class Caps(ProgramTest):
         said = self.peak(0, 128, "ptcbuild", mesh, "--points", "20k", "-o", self.here / "o.ptcx")
         self.assertIn("the meshes do not fit in memory", said)
         self.succeed("ptcverify", self.here / "o.ptcx")
+
+    def test_thousands_of_triangles_on_each_surfel_stay_within_the_cap(self):
+        mesh = self.here / "waves.ply"
+        for points, ground in (("200", 0), ("200k", 50)):  # what is near a surfel was all of the mesh
+            self.write_waves(mesh, 700, ground)
+            self.peak(0, 128, "ptcbuild", mesh, "--points", points, "--no-default-lights", "-o", self.here / "o.ptcx")
 
     def test_a_mesh_that_fits_is_seen_and_not_its_surfels(self):
         mesh = self.here / "waves.ply"

@@ -107,6 +107,30 @@ TEST_CASE("streamed sampler: surfels are as many, as large and as even as in mem
   }
 }
 
+TEST_CASE(
+    "streamed sampler: triangles far smaller than surfels are as good, though not all are read",
+    "[scene][streamed]") {
+  // 16 and 160 surfels a patch; what is near one has up to ten times its triangles
+  const std::uint64_t count = GENERATE(300U, 3000U);
+  SamplingOptions options;
+  options.count = count;
+  const Mesh mesh = terrain(400);
+  const auto streamed = stream({mesh}, options), usual = in_memory(mesh, options);
+  const double spacing = spacing_for(mesh, count);
+  const Coverage a = measure_coverage(mesh, streamed, spacing, 20'000),
+                 b = measure_coverage(mesh, usual, spacing, 20'000);
+  INFO("nearest mean " << a.nearest_mean << ' ' << b.nearest_mean << ", hole " << a.largest_hole
+                       << ' ' << b.largest_hole << ", uncovered " << a.uncovered << ' '
+                       << b.uncovered);
+  CHECK(static_cast<double>(streamed.size()) == Approx(static_cast<double>(count)).epsilon(0.02));
+  CHECK(covered_area(streamed) == Approx(one_sided_area(mesh)).epsilon(0.01));
+  CHECK(mean_radius(streamed) == Approx(mean_radius(usual)).epsilon(0.03));
+  CHECK(a.nearest_mean == Approx(b.nearest_mean).epsilon(0.03));
+  CHECK(a.largest_hole < 1.2);
+  CHECK(a.uncovered <
+        1.5 * b.uncovered);  // 1.35 times with all triangles: small patches have seams
+}
+
 TEST_CASE("streamed sampler: surfels do not depend on memory or threads", "[scene][streamed]") {
   SamplingOptions options;
   options.count = 30'000;

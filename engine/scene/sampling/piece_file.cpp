@@ -10,12 +10,14 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
 #include <glm/common.hpp>
 
+#include "engine/base/basis.h"
 #include "engine/io/file/disk_space.h"
 #include "engine/sort/external_sort.h"
 #include "engine/sort/point_streams.h"
@@ -31,12 +33,12 @@ constexpr std::size_t kRowsAtOnce = std::size_t{1} << 12;
 // Surfels look for the surface up to this far beyond their patch: their radius is about 0.7
 // spacings, and they look for 1.1 radii along the surface and 0.9 away from it.
 constexpr float kMarginSpacings = 3;
-
-bool overlap(const glm::vec3& low_a, const glm::vec3& high_a, const glm::vec3& low_b,
-             const glm::vec3& high_b) {
-  return low_a.x <= high_b.x && low_b.x <= high_a.x && low_a.y <= high_b.y && low_b.y <= high_a.y &&
-         low_a.z <= high_b.z && low_b.z <= high_a.z;
-}
+// Runs of boxes in the next level, and of pieces in a block that is read
+constexpr std::size_t kChildren = 8, kRunPieces = 16;
+// Near a patch, a run whose box has this diagonal is one rectangle: a share of the least spacing in
+// the patch, or of the distance, from which only surfels as large as that look. Where too many runs
+// are left, the share is doubled.
+constexpr float kRunShare = 0.25F;
 
 }  // namespace
 
@@ -70,10 +72,15 @@ void PieceFile::unpack(const std::byte* from, Row& row) const noexcept {
   });
 }
 
-PieceFile::Box PieceFile::box_of(const Row& row) {
+PieceFile::Run PieceFile::run_of(const Row& row) {
   const SubTriangle shape = piece_of(whole_triangle(row.triangle.positions), row.path);
   const glm::vec3 a(shape.corner[0]), b(shape.corner[1]), c(shape.corner[2]);
-  return {glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))};
+  return {{glm::min(a, glm::min(b, c)), glm::max(a, glm::max(b, c))}, glm::cross(b - a, c - a)};
+}
+
+void PieceFile::merge(Run& into, const Run& other) {
+  into.box = {glm::min(into.box.low, other.box.low), glm::max(into.box.high, other.box.high)};
+  into.normal += other.normal;
 }
 
 PieceFile::PieceFile(const MeshParts& parts, const SurfaceSurvey& found, const SpacingField& field,
@@ -96,7 +103,7 @@ std::size_t PieceFile::groups() const noexcept {
 /// Writes the rows as they come out of the sorts, and closes patches and blocks.
 class PieceFile::Writer {
  public:
-  explicit Writer(PieceFile& to) : to_(to) {}
+  explicit Writer(PieceFile& to) : to_(to) { to_.levels_.emplace_back(); }
 
   void add(const std::byte* packed) {
     // Write the row
@@ -107,16 +114,14 @@ class PieceFile::Writer {
     to_.unpack(packed, row);
     const SubTriangle shape = piece_of(whole_triangle(row.triangle.positions), row.path);
     const double spacing = spacing_of(shape, to_.field_, to_.parts_.origin());
-    const Box box = box_of(row);
-    if (pieces_ % kBlockPieces == 0) {
-      to_.blocks_.push_back(box);
-    } else {
-      Box& block = to_.blocks_.back();
-      block = {glm::min(block.low, box.low), glm::max(block.high, box.high)};
-    }
+    std::vector<Run>& blocks = to_.levels_[0];
+    const Run run = run_of(row);
+    if (pieces_ % kBlockPieces == 0) blocks.emplace_back();
+    merge(blocks.back(), run);
     ++pieces_;
     weight_ += shape.area() / (spacing * spacing);
-    spacing_ = std::max(spacing_, static_cast<float>(spacing));
+    widest_ = std::max(widest_, static_cast<float>(spacing));
+    closest_ = std::min(closest_, static_cast<float>(spacing));
     if (weight_ - to_.weights_.back() >= to_.patch_surfels_ ||
         pieces_ - to_.begins_.back() >= kPatchPieces)
       close();
@@ -125,6 +130,7 @@ class PieceFile::Writer {
   void finish() {
     flush();
     if (pieces_ > to_.begins_.back()) close();
+    while (to_.levels_.back().size() > 1) add_level();
   }
 
  private:
@@ -133,8 +139,19 @@ class PieceFile::Writer {
   void close() {
     to_.begins_.push_back(pieces_);
     to_.weights_.push_back(weight_);
-    to_.spacings_.push_back(spacing_);
-    spacing_ = 0;
+    to_.widest_.push_back(widest_);
+    to_.closest_.push_back(closest_);
+    widest_ = 0;
+    closest_ = std::numeric_limits<float>::infinity();
+  }
+  void add_level() {
+    std::vector<Run> next;
+    const std::vector<Run>& last = to_.levels_.back();
+    for (std::size_t i = 0; i < last.size(); ++i) {
+      if (i % kChildren == 0) next.emplace_back();
+      merge(next.back(), last[i]);
+    }
+    to_.levels_.push_back(std::move(next));
   }
   void flush() {
     to_.file_.write_at(written_, buffer_);
@@ -147,7 +164,8 @@ class PieceFile::Writer {
   std::uint64_t written_ = 0;
   std::uint64_t pieces_ = 0;
   double weight_ = 0;
-  float spacing_ = 0;
+  float widest_ = 0;
+  float closest_ = std::numeric_limits<float>::infinity();
 };
 
 void PieceFile::sort(const SurfaceSurvey& found, const PieceSortOptions& options,
@@ -261,6 +279,36 @@ class PieceFile::LocalMesh {
     return index;
   }
 
+  /// Adds an opaque rectangle in the mean plane of a run, as wide as its box.
+  void add_rectangle(const Run& run) {
+    const glm::vec3 middle = 0.5F * (run.box.low + run.box.high);
+    const glm::vec3 half = 0.5F * (run.box.high - run.box.low);
+    glm::vec3 normal(0);
+    if (glm::dot(run.normal, run.normal) > 0) {
+      normal = glm::normalize(run.normal);
+    } else {
+      normal[half.x <= half.y && half.x <= half.z ? 0 : half.y <= half.z ? 1 : 2] = 1;
+    }
+    const Basis basis(normal);
+    const glm::vec3 x = basis.x * glm::dot(glm::abs(basis.x), half),
+                    y = basis.y * glm::dot(glm::abs(basis.y), half);
+    const auto vertex = static_cast<std::uint32_t>(mesh_.positions.size());
+    for (const glm::vec3& corner : {-x - y, x - y, x + y, -x + y}) {
+      mesh_.positions.push_back(middle + corner);
+      if (parts_.has_normals()) mesh_.normals.push_back(normal);
+      if (parts_.has_uvs()) mesh_.uvs.emplace_back(0);
+      if (parts_.has_colours()) mesh_.colours.emplace_back(1);
+    }
+    if (!opaque_) {
+      opaque_ = static_cast<std::uint16_t>(mesh_.materials.size());
+      mesh_.materials.emplace_back();
+    }
+    for (const std::uint32_t k : {1U, 2U}) {
+      mesh_.triangles.push_back({vertex, vertex + k, vertex + k + 1});
+      mesh_.material_of.push_back(*opaque_);
+    }
+  }
+
   [[nodiscard]] Mesh take() { return std::move(mesh_); }
 
  private:
@@ -286,44 +334,137 @@ class PieceFile::LocalMesh {
   Mesh mesh_;
   std::unordered_multimap<std::uint64_t, std::uint32_t> known_;  ///< triangles by hash
   std::map<std::uint32_t, std::uint16_t> materials_;             ///< by index in the parts
+  std::optional<std::uint16_t> opaque_;                          ///< material of rectangles
+};
+
+/// Finds what is near a patch.
+class PieceFile::Surroundings {
+ public:
+  /// @param rows  of the patch
+  Surroundings(const PieceFile& file, std::size_t patch, std::span<const Row> rows)
+      : file_(file),
+        begin_(file.begins_[patch]),
+        end_(file.begins_[patch + 1]),
+        margin_(kMarginSpacings * file.widest_[patch]),
+        closest_(file.closest_[patch]) {
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const Run run = run_of(rows[i]);
+      if (i % kBlockPieces == 0) own_.emplace_back();
+      merge(own_.back(), run);
+      merge(all_, run);
+    }
+  }
+
+  /// Finds triangles and runs. @return false when there are too many
+  [[nodiscard]] bool find(float share) {
+    share_ = share;
+    triangles_.clear();
+    runs_.clear();
+    const std::size_t top = file_.levels_.size() - 1;
+    for (std::size_t i = 0; i < file_.levels_[top].size(); ++i) {
+      if (!look_at(top, i)) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] const std::vector<MeshTriangle>& triangles() const noexcept { return triangles_; }
+  [[nodiscard]] const std::vector<Run>& runs() const noexcept { return runs_; }
+
+ private:
+  /// Returns how far a box is from the patch; nothing when it is not near.
+  [[nodiscard]] std::optional<float> distance(const Box& box) const {
+    const auto gap = [&](const Box& to) {
+      return glm::max(glm::max(box.low - to.high, to.low - box.high), glm::vec3(0));
+    };
+    const auto is_near = [&](const glm::vec3& to) {
+      return std::max({to.x, to.y, to.z}) <= margin_;
+    };
+    if (!is_near(gap(all_.box))) return std::nullopt;
+    std::optional<float> least;
+    for (const Run& run : own_) {
+      const glm::vec3 to = gap(run.box);
+      if (is_near(to)) least = std::min(least.value_or(margin_ * 2), glm::length(to));
+    }
+    return least;
+  }
+  [[nodiscard]] bool is_small(const Box& box, float distance) const {
+    return glm::distance(box.low, box.high) <= share_ * std::max(closest_, distance);
+  }
+  [[nodiscard]] bool is_full() const noexcept {
+    return triangles_.size() + 2 * runs_.size() > kMostNear;
+  }
+
+  bool look_at(std::size_t level, std::size_t index) {
+    // Pass over what is the patch itself
+    std::uint64_t pieces = kBlockPieces;
+    for (std::size_t i = 0; i < level; ++i) pieces *= kChildren;
+    const std::uint64_t first = index * pieces,
+                        last = std::min(file_.begins_.back(), first + pieces);
+    if (first >= begin_ && last <= end_) return true;
+    // Take it as one, or look into it
+    const Run& run = file_.levels_[level][index];
+    const auto away = distance(run.box);
+    if (!away) return true;
+    const bool apart = last <= begin_ || first >= end_;
+    if (apart && is_small(run.box, *away)) {
+      runs_.push_back(run);
+      return !is_full();
+    }
+    if (level == 0) return look_into_block(first, last);
+    const std::size_t children = file_.levels_[level - 1].size();
+    for (std::size_t i = index * kChildren; i < std::min(children, (index + 1) * kChildren); ++i) {
+      if (!look_at(level - 1, i)) return false;
+    }
+    return true;
+  }
+  bool look_into_block(std::uint64_t first, std::uint64_t last) {
+    rows_.resize(last - first);
+    file_.read_rows(first, rows_);
+    for (std::uint64_t from = first; from < last; from += kRunPieces) {
+      Run run;
+      const std::uint64_t to = std::min(last, from + kRunPieces);
+      for (std::uint64_t i = from; i < to; ++i) {
+        if (i < begin_ || i >= end_) merge(run, run_of(rows_[i - first]));
+      }
+      const auto away = distance(run.box);
+      if (!away) continue;
+      if (is_small(run.box, *away)) {
+        runs_.push_back(run);
+      } else {
+        for (std::uint64_t i = from; i < to; ++i) {
+          const Row& row = rows_[i - first];
+          if ((i < begin_ || i >= end_) && distance(run_of(row).box))
+            triangles_.push_back(row.triangle);
+        }
+      }
+      if (is_full()) return false;
+    }
+    return true;
+  }
+
+  const PieceFile& file_;
+  std::uint64_t begin_, end_;
+  float margin_, closest_;
+  float share_ = kRunShare;
+  std::vector<Run> own_;  // blocks of the patch
+  Run all_;
+  std::vector<Row> rows_;
+  std::vector<MeshTriangle> triangles_;
+  std::vector<Run> runs_;
 };
 
 PieceFile::Patch PieceFile::load(std::size_t patch) const {
-  // Read its own pieces, and find the boxes that these lie in
+  // Read its own pieces
   Patch loaded{.before = weights_[patch], .weight = weights_[patch + 1] - weights_[patch]};
-  const std::uint64_t begin = begins_[patch], end = begins_[patch + 1];
-  const glm::vec3 margin(kMarginSpacings * spacings_[patch]);
   LocalMesh local(parts_);
-  std::vector<Row> rows(end - begin);
-  read_rows(begin, rows);
-  std::vector<Box> own;
-  Box all{glm::vec3(std::numeric_limits<float>::infinity()),
-          glm::vec3(-std::numeric_limits<float>::infinity())};
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    loaded.pieces.push_back({local.add(rows[i].triangle), rows[i].path});
-    const Box box = box_of(rows[i]);
-    if (i % kBlockPieces == 0) own.push_back({box.low - margin, box.high + margin});
-    own.back() = {glm::min(own.back().low, box.low - margin),
-                  glm::max(own.back().high, box.high + margin)};
-    all = {glm::min(all.low, own.back().low), glm::max(all.high, own.back().high)};
-  }
-
-  // Add the triangles of pieces near them
-  const auto is_near = [&](const Box& box) {
-    return overlap(box.low, box.high, all.low, all.high) &&
-           std::ranges::any_of(
-               own, [&](const Box& o) { return overlap(box.low, box.high, o.low, o.high); });
-  };
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const std::uint64_t first = b * kBlockPieces,
-                        last = std::min(begins_.back(), first + kBlockPieces);
-    if ((first >= begin && last <= end) || !is_near(blocks_[b])) continue;
-    rows.resize(last - first);
-    read_rows(first, rows);
-    for (std::uint64_t i = first; i < last; ++i) {
-      if (i >= begin && i < end) continue;
-      if (is_near(box_of(rows[i - first]))) static_cast<void>(local.add(rows[i - first].triangle));
-    }
+  std::vector<Row> rows(begins_[patch + 1] - begins_[patch]);
+  read_rows(begins_[patch], rows);
+  for (const Row& row : rows) loaded.pieces.push_back({local.add(row.triangle), row.path});
+  // Add what is near it
+  if (surfels_of(loaded.before + loaded.weight) > surfels_of(loaded.before)) {
+    Surroundings near(*this, patch, rows);
+    for (float share = kRunShare; !near.find(share);) share *= 2;
+    for (const MeshTriangle& triangle : near.triangles()) static_cast<void>(local.add(triangle));
+    for (const Run& run : near.runs()) local.add_rectangle(run);
   }
   loaded.mesh = local.take();
   return loaded;
@@ -337,7 +478,8 @@ std::uint64_t PieceFile::index_bytes(std::uint64_t triangles, std::uint64_t surf
   const std::uint64_t patches =
       pieces / kPatchPieces +
       static_cast<std::uint64_t>(static_cast<double>(surfels) / patch_surfels);
-  return 2 * (pieces / kBlockPieces * sizeof(Box) + patches * 20);
+  const std::uint64_t runs = pieces / kBlockPieces * kChildren / (kChildren - 1);
+  return 2 * (runs * sizeof(Run) + patches * 24);
 }
 
 }  // namespace ptc

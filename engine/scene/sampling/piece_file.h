@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -33,8 +34,10 @@ struct PieceSortOptions {
 ///     patches      |----------------|--------------|--          pieces that follow one another
 ///     blocks       |---|---|---|---|---|---|---|---|---|        kBlockPieces each, with a box
 ///
-/// The boxes of the blocks tell which pieces lie near a patch: a surfel looks for the ends of the
-/// surface around it, also beyond its patch.
+/// The boxes of the blocks, and of 8 blocks, 64 blocks and so on, tell which pieces lie near a
+/// patch: a surfel looks for the ends of the surface around it, also beyond its patch. Pieces that
+/// lie together in a box far smaller than what a surfel covers are one rectangle there, however
+/// many they are.
 ///
 /// Memory: index_bytes().   Threads: const members may be called concurrently.
 class PieceFile {
@@ -51,7 +54,9 @@ class PieceFile {
 
   /// A patch and the surface around it.
   struct Patch {
-    Mesh mesh;                                  ///< triangles of the patch, and of what is near it
+    /// Triangles of the patch, and of what is near it if it gets a surfel. There, opaque rectangles
+    /// may stand for many pieces; what is near has at most kMostNear triangles.
+    Mesh mesh;
     std::vector<SurfacePatches::Piece> pieces;  ///< of the patch alone, along the curve
     double before = 0;                          ///< weight of all patches before it
     double weight = 0;                          ///< of its pieces
@@ -62,17 +67,25 @@ class PieceFile {
   /// Returns the memory of an open file of pieces, bytes.
   [[nodiscard]] static std::uint64_t index_bytes(std::uint64_t triangles, std::uint64_t surfels,
                                                  double patch_surfels) noexcept;
-  /// The most memory of a patch and of a ray scene over its mesh, bytes.
+  /// The most memory of a patch, of what is near it and of a ray scene over them, bytes.
   static constexpr std::uint64_t kPatchBytes = std::uint64_t{16} << 20;
+  static constexpr std::size_t kMostNear = std::size_t{1} << 14;
 
  private:
   struct Row;
   class Writer;
   /// A box in floats, relative to the origin of the parts.
   struct Box {
-    glm::vec3 low, high;
+    glm::vec3 low{std::numeric_limits<float>::infinity()},
+        high{-std::numeric_limits<float>::infinity()};
+  };
+  /// Pieces that follow one another.
+  struct Run {
+    Box box;
+    glm::vec3 normal{0};  ///< sum of those of the pieces, twice as long as their areas
   };
   class LocalMesh;
+  class Surroundings;
 
   [[nodiscard]] std::size_t groups() const noexcept;
   void sort(const SurfaceSurvey& found, const PieceSortOptions& options, const Executor& executor);
@@ -82,7 +95,8 @@ class PieceFile {
   void move_fields(AnyRow& row, const Move& move) const;
   void pack(const Row& row, std::byte* to) const noexcept;
   void unpack(const std::byte* from, Row& row) const noexcept;
-  [[nodiscard]] static Box box_of(const Row& row);
+  [[nodiscard]] static Run run_of(const Row& row);
+  static void merge(Run& into, const Run& other);
 
   const MeshParts& parts_;
   const SpacingField& field_;
@@ -91,8 +105,8 @@ class PieceFile {
   TempFile file_;
   std::vector<std::uint64_t> begins_{0};  ///< first piece of each patch, then the end
   std::vector<double> weights_{0};        ///< weight of all patches before each, then the total
-  std::vector<float> spacings_;           ///< the greatest in each patch
-  std::vector<Box> blocks_;
+  std::vector<float> widest_, closest_;   ///< the greatest and the least spacing in each patch
+  std::vector<std::vector<Run>> levels_;  ///< blocks, then kChildren of the level before, ...
 };
 
 }  // namespace ptc
