@@ -424,7 +424,73 @@ TEST_CASE("gltf: COLOR_0 colours the vertices of its primitive, others stay whit
   CHECK(mesh.colours[mesh.triangles[1][1]] == glm::vec3(0, 1, 0));
 }
 
-TEST_CASE("gltf: colours that are stored sparsely are left out and told", "[io][gltf]") {
+TEST_CASE("gltf: elements of a sparse accessor take the place of others", "[io][gltf]") {
+  const Files files;
+  // The second position, and the second colour of others that are black
+  std::string bytes = buffer_bytes();
+  const std::size_t at = bytes.size();
+  bytes += raw(std::uint16_t{1}) + std::string(2, '\0') + raw(5.0F) + raw(1.0F) + raw(0.5F);
+  files.scratch.file("a b.bin", bytes);
+  Json json = document();
+  json["buffers"][0]["byteLength"] = bytes.size();
+  json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", 2}});
+  json["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at + 4}, {"byteLength", 12}});
+  const Json sparse{{"count", 1},
+                    {"indices", {{"bufferView", 3}, {"componentType", 5123}}},
+                    {"values", {{"bufferView", 4}}}};
+  json["accessors"][0]["sparse"] = sparse;
+  json["accessors"].push_back(
+      {{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}, {"sparse", sparse}});
+  json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 3;
+  const MeshFile file = files.read(json);
+  CHECK(file.warnings.empty());
+  REQUIRE(file.mesh.triangles.size() == 1);
+  CHECK(corner(file.mesh, 0, 0) == glm::dvec3(0));
+  CHECK(corner(file.mesh, 0, 1) == glm::dvec3(5, 1, 0.5));
+  CHECK(corner(file.mesh, 0, 2) == glm::dvec3(0, 1, 0));
+  for (std::size_t k = 0; k < 3; ++k) {
+    const glm::vec3 colour = k == 1 ? glm::vec3(1, 1, 0.5F) : glm::vec3(0);
+    CHECK(file.mesh.colours[file.mesh.triangles[0][k]] == colour);
+  }
+
+  // What breaks a rule is refused
+  const auto said = [&](const char* pointer, const Json& value) {
+    Json broken = json;
+    broken[Json::json_pointer(std::string("/accessors/0/sparse") + pointer)] = value;
+    return files.fault(broken);
+  };
+  CHECK_THAT(said("/count", 0), Contains("accessor 0 is sparse without a count"));
+  CHECK_THAT(said("/count", 4), Contains("accessor 0 is sparse without a count"));
+  CHECK_THAT(said("/count", 2), Contains("reach past their bufferView"));
+  CHECK_THAT(said("/indices/componentType", 5126), Contains("are of no unsigned type"));
+  CHECK_THAT(said("/indices/byteOffset", UINT64_MAX), Contains("reach past their bufferView"));
+  CHECK_THAT(said("/values/bufferView", 99), Contains("bufferViews has no entry 99"));
+  CHECK_THAT(said("/indices", {{"bufferView", 4}, {"byteOffset", 2}, {"componentType", 5123}}),
+             Contains("do not ascend or lie behind"));
+  json["accessors"][0].erase("bufferView");
+  CHECK_THAT(files.fault(json), Contains("accessor 0 has no bufferView"));
+}
+
+TEST_CASE("gltf: what is not read is told", "[io][gltf]") {
+  const Files files;
+  Json json = document();
+  json["meshes"][0]["weights"] = {0, 0.5};
+  Json points = json["meshes"][0]["primitives"][0];
+  points["mode"] = 0;
+  json["meshes"][0]["primitives"].push_back(points);
+  json["cameras"] = {{{"type", "orthographic"}, {"orthographic", {{"xmag", 1}}}}};
+  json["nodes"][0]["camera"] = 0;
+  json["nodes"][0]["weights"] = {1};
+  const MeshFile file = files.read(json);
+  CHECK(file.mesh.triangles.size() == files.read(document()).mesh.triangles.size());
+  REQUIRE(file.warnings.size() == 3);
+  CHECK_THAT(file.warnings[0], Contains("camera 0, not a perspective one"));
+  CHECK_THAT(file.warnings[1], Contains("weights of morph targets are left out") &&
+                                   Contains("node 0") && Contains("mesh 0"));
+  CHECK_THAT(file.warnings[2], Contains("a primitive of points or lines is left out"));
+}
+
+TEST_CASE("gltf: colours that are not in the file are left out and told", "[io][gltf]") {
   const Files files;
   Json json = document();
   json["accessors"].push_back({{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}});
@@ -432,7 +498,7 @@ TEST_CASE("gltf: colours that are stored sparsely are left out and told", "[io][
   const MeshFile file = files.read(json);
   CHECK(file.mesh.colours.empty());
   REQUIRE(file.warnings.size() == 1);
-  CHECK_THAT(file.warnings[0], Contains("stored sparsely: accessor 3"));
+  CHECK_THAT(file.warnings[0], Contains("not in the file: accessor 3"));
 }
 
 TEST_CASE("gltf: samplers say how textures go on, and what is not understood is told",
@@ -587,7 +653,7 @@ TEST_CASE("gltf: ranges that reach past their buffer are refused", "[io][gltf]")
              Contains("accessor 0 has elements that overlap"));
   CHECK_THAT(with("/accessors/0/type", "VEC2"), Contains("accessor 0 is of the wrong type"));
   CHECK_THAT(with("/accessors/0/componentType", 5124), Contains("unknown componentType"));
-  CHECK_THAT(with("/accessors/0/sparse", Json::object()), Contains("is sparse"));
+  CHECK_THAT(with("/accessors/0/sparse", Json::object()), Contains("is sparse without a count"));
   CHECK_THAT(with("/accessors/1/componentType", 5121), Contains("no triangle"));
   CHECK_THAT(with("/nodes/0/mesh", 1), Contains("meshes has no entry 1"));
   CHECK_THAT(with("/nodes/0/mesh", -1), Contains("mesh is not an unsigned integer"));

@@ -255,6 +255,19 @@ TEST_CASE("obj: materials come from the library, textures from files next to it"
                            Contains("a material is not defined and becomes plain grey: 'missing'"));
 }
 
+TEST_CASE("obj: kinds of statements that are left out are told once each", "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  scratch.file("a.mtl",
+               "newmtl a\nKd 1 0 0\nKs 1 1 1\nillum 2\nmap_Bump b.png\nnewmtl b\nKs 0 0 0\n");
+  const MeshFile file = read(scratch, kSquare +
+                                          "mtllib a.mtl\nusemtl a\ns 1\nf 1 2 3\nl 1 2\nl 2 3\n"
+                                          "curv 0 1 1 2\n");
+  REQUIRE(file.warnings.size() == 1);
+  CHECK(file.warnings[0] ==
+        "4 kinds of statements are left out: 'Ks' of materials; 'map_Bump' of materials; 'l'; "
+        "'curv'");
+}
+
 TEST_CASE("obj: a line may name several libraries, with escaped blanks and missing ones",
           "[io][mesh]") {
   const test::TemporaryDirectory scratch;

@@ -43,6 +43,16 @@ TEST_CASE("ply mesh: triangles and vertices are read as they are in the file", "
   CHECK(mesh.bounds().high == glm::dvec3(1, 1, 0));
 }
 
+TEST_CASE("ply mesh: colours of faces are left out and told", "[io][mesh]") {
+  const test::TemporaryDirectory scratch;
+  const std::string colours = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  const MeshFile file = read(scratch, header("ascii", kVertices + kFaces + colours) + kSquare +
+                                          "3 0 1 2 255 0 0\n3 0 2 3 0 255 0\n");
+  CHECK(file.mesh.colours.empty());
+  REQUIRE(file.warnings.size() == 1);
+  CHECK_THAT(file.warnings[0], Contains("colours of faces are left out"));
+}
+
 TEST_CASE("ply mesh: faces may come before the vertices", "[io][mesh]") {
   const test::TemporaryDirectory scratch;
   const Mesh mesh =

@@ -242,9 +242,8 @@ void GltfAnimation::set_value(const GltfDocument::Elements& values, Interpolatio
   // Read the values of the key before the time and of the next one, if it counts
   const std::uint64_t of_key = how == Interpolation::cubic ? 3 : 1;
   const bool between = keys.fraction > 0 && how != Interpolation::step;
-  GltfDocument::Elements around = values;
-  around.offset += keys.before * of_key * values.stride;
-  around.count = between ? 2 * of_key : of_key;
+  const GltfDocument::Elements around =
+      values.part(keys.before * of_key, between ? 2 * of_key : of_key);
   std::array<std::array<double, 4>, 6> read{};
   std::size_t index = 0;
   document_.read(around, [&](std::span<const double> value) {

@@ -377,10 +377,14 @@ GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::siz
                                                    std::optional<std::uint64_t> expected) {
   const Json& accessor = at("accessors", index);
   const std::string name = "accessor " + std::to_string(index);
-  if (accessor.contains("sparse")) fail(name + " is sparse, which is not supported");
   const auto view_index = unsigned_at(accessor, "bufferView");
-  if (!view_index) fail(name + " has no bufferView");
+  const Json* const sparse = member(accessor, "sparse");
+  if (!view_index && (sparse == nullptr || !expected)) fail(name + " has no bufferView");
   Elements found = find_shape(index, components, expected);
+  found.accessor = index;
+  if (sparse != nullptr) find_replaced(*sparse, name, found);
+  if (!view_index) return found;
+  found.has_view = true;
 
   // Check that all elements lie in the buffer view
   const View view = find_view(*view_index);
@@ -399,23 +403,123 @@ GltfDocument::Elements GltfDocument::find_elements(std::uint64_t index, std::siz
   return found;
 }
 
+// Finds the elements of a sparse accessor that others take the place of (section 3.6.2.3).
+void GltfDocument::find_replaced(const Json& sparse, const std::string& name, Elements& found) {
+  Elements::Replaced& replaced = found.replaced;
+  replaced.count = unsigned_at(sparse, "count").value_or(0);
+  replaced.of = found.count;
+  const Json* const indices = member(sparse, "indices");
+  const Json* const values = member(sparse, "values");
+  if (replaced.count == 0 || replaced.count > found.count || indices == nullptr ||
+      values == nullptr) {
+    fail(name + " is sparse without a count, indices and values of it");
+  }
+  const auto place = [&](const Json& part, std::uint64_t bytes, std::uint64_t& buffer,
+                         std::uint64_t& offset) {
+    const auto view_index = unsigned_at(part, "bufferView");
+    if (!view_index) fail(name + " is sparse, but its indices or values have no bufferView");
+    const View view = find_view(*view_index);
+    const std::uint64_t from = unsigned_at(part, "byteOffset").value_or(0);
+    if (from > view.length || replaced.count > (view.length - from) / bytes)
+      fail(name + " is sparse, and its indices or values reach past their bufferView");
+    buffer = view.buffer;
+    offset = view.offset + from;
+  };
+  replaced.index_type = unsigned_at(*indices, "componentType").value_or(0);
+  const std::uint64_t type = replaced.index_type;
+  constexpr std::uint64_t kUnsignedByte = 5121, kUnsignedShort = 5123, kUnsignedInt = 5125;
+  if (type != kUnsignedByte && type != kUnsignedShort && type != kUnsignedInt)
+    fail(name + " is sparse, and its indices are of no unsigned type");
+  place(*indices, gltf_number(type)->bytes, replaced.index_buffer, replaced.index_offset);
+  place(*values, gltf_number(found.type)->bytes * found.components, replaced.value_buffer,
+        replaced.value_offset);
+}
+
+/// Reads the elements that take the place of others, one after another.
+class GltfDocument::Replacement {
+ public:
+  Replacement(const GltfDocument& document, const Elements& of)
+      : document_(document),
+        of_(of),
+        index_bytes_(of.replaced.count > 0 ? gltf_number(of.replaced.index_type)->bytes : 0),
+        value_bytes_(gltf_number(of.type)->bytes * of.components) {
+    do {
+      advance();
+    } while (at_ < of.first);
+  }
+
+  /// Returns the bytes of an element, or null when nothing takes its place.
+  /// @param index  in the accessor; must ascend from call to call
+  [[nodiscard]] const std::byte* find(std::uint64_t index) {
+    if (at_ < index) advance();
+    return at_ == index ? value_ : nullptr;
+  }
+
+ private:
+  static constexpr std::uint64_t kAtOnce = 1 << 10;
+
+  // Goes on to the next one.
+  void advance() {
+    const Elements::Replaced& replaced = of_.replaced;
+    if (done_ == replaced.count) {
+      at_ = std::numeric_limits<std::uint64_t>::max();
+      return;
+    }
+    const std::uint64_t k = done_ % kAtOnce;
+    if (k == 0) {
+      const std::uint64_t count = std::min(kAtOnce, replaced.count - done_);
+      indices_.resize(count * index_bytes_);
+      values_.resize(count * value_bytes_);
+      const auto read = [&](std::uint64_t buffer, std::uint64_t offset,
+                            std::vector<std::byte>& to) {
+        document_.buffers_[buffer]->part(offset, to.size()).read(0, to);
+      };
+      read(replaced.index_buffer, replaced.index_offset + done_ * index_bytes_, indices_);
+      read(replaced.value_buffer, replaced.value_offset + done_ * value_bytes_, values_);
+    }
+    const auto index = static_cast<std::uint64_t>(
+        load_gltf_number(&indices_[k * index_bytes_], replaced.index_type));
+    if ((done_ > 0 && index <= at_) || index >= replaced.of) {
+      document_.fail("accessor " + std::to_string(of_.accessor) +
+                     " is sparse, and its indices do not ascend or lie behind its end");
+    }
+    at_ = index;
+    value_ = &values_[k * value_bytes_];
+    ++done_;
+  }
+
+  const GltfDocument& document_;
+  const Elements& of_;
+  std::uint64_t index_bytes_, value_bytes_;
+  std::uint64_t done_ = 0;                   // that were read
+  std::uint64_t at_ = 0;                     // index of the last one
+  const std::byte* value_ = nullptr;         // its bytes
+  std::vector<std::byte> indices_, values_;  // of some
+};
+
 void GltfDocument::read(const Elements& elements,
                         const std::function<void(std::span<const double>)>& take) const {
   constexpr std::uint64_t kBlockBytes = 1 << 18;
   const GltfNumber number = *gltf_number(elements.type);
   const std::uint64_t element_bytes = number.bytes * elements.components;
-  const std::uint64_t at_once = std::max<std::uint64_t>(1, kBlockBytes / elements.stride);
-  const Buffer& buffer = *buffers_[elements.buffer];
+  const std::uint64_t stride = elements.has_view ? elements.stride : element_bytes;
+  const std::uint64_t at_once = std::max<std::uint64_t>(1, kBlockBytes / stride);
+  Replacement replacement(*this, elements);
   std::vector<std::byte> bytes;
   std::array<double, 4> values{};
   for (std::uint64_t first = 0; first < elements.count; first += at_once) {
     const std::uint64_t count = std::min(at_once, elements.count - first);
-    bytes.resize((count - 1) * elements.stride + element_bytes);
-    buffer.part(elements.offset + first * elements.stride, bytes.size()).read(0, bytes);
+    bytes.resize((count - 1) * stride + element_bytes);
+    if (elements.has_view) {
+      buffers_[elements.buffer]
+          ->part(elements.offset + first * stride, bytes.size())
+          .read(0, bytes);
+    }
     for (std::uint64_t i = 0; i < count; ++i) {
+      const std::byte* from = replacement.find(elements.first + first + i);
+      if (from == nullptr) from = &bytes[i * stride];
       for (std::size_t k = 0; k < elements.components; ++k) {
-        const double value =
-            load_gltf_number(&bytes[i * elements.stride + k * number.bytes], elements.type);
+        const double value = load_gltf_number(from + k * number.bytes, elements.type);
         values[k] = elements.normalised ? std::max(-1.0, value / number.scale) : value;
       }
       take(std::span(values).first(elements.components));

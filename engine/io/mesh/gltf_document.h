@@ -84,6 +84,27 @@ class GltfDocument {
     std::uint64_t offset = 0, stride = 0;  ///< of the first element, and between two, bytes
     std::uint64_t type = 0;                ///< componentType
     bool normalised = false;
+    bool has_view = false;  ///< else all elements are 0, but for those that are replaced
+    /// Elements of an accessor that is sparse, which others take the place of.
+    struct Replaced {
+      std::uint64_t count = 0;
+      std::uint64_t of = 0;                              ///< elements of the accessor
+      std::uint64_t index_type = 0;                      ///< componentType of their indices
+      std::uint64_t index_buffer = 0, index_offset = 0;  ///< where these lie, ascending
+      std::uint64_t value_buffer = 0, value_offset = 0;  ///< where the others lie
+    };
+    Replaced replaced{};
+    std::uint64_t first = 0;     ///< index of the first element in the accessor
+    std::uint64_t accessor = 0;  ///< index of the accessor
+
+    /// Returns some of the elements.
+    [[nodiscard]] Elements part(std::uint64_t from, std::uint64_t many) const noexcept {
+      Elements some = *this;
+      some.offset += from * stride;
+      some.first += from;
+      some.count = many;
+      return some;
+    }
   };
   /// Finds what accessors[index] says of its elements, but not where they lie: its buffer, offset
   /// and stride are 0. @throws as find_elements()
@@ -91,13 +112,16 @@ class GltfDocument {
                                     std::optional<std::uint64_t> expected = std::nullopt) const;
   /// Finds the elements of accessors[index].
   /// @param components  numbers in each element
-  /// @param expected    number of elements that there must be, if it is known
+  /// @param expected    number of elements that there must be, if it is known; an accessor without
+  /// a
+  ///                    buffer view, whose number no bytes justify, needs it, and must be sparse
   /// @throws DataError when the accessor breaks a rule or has another shape; std::system_error
   [[nodiscard]] Elements find_elements(std::uint64_t index, std::size_t components,
                                        std::optional<std::uint64_t> expected = std::nullopt);
   /// Reads elements, in their order. Normalised integers are scaled to [0, 1] or [-1, 1].
   /// @param take  is called with the numbers of each element
-  /// @throws DataError, std::system_error when the file does not give the bytes
+  /// @throws DataError when the file does not give the bytes, or when indices of a sparse accessor
+  ///         do not ascend; std::system_error
   void read(const Elements& elements,
             const std::function<void(std::span<const double>)>& take) const;
   /// Returns the memory of the JSON, bytes.
@@ -131,6 +155,8 @@ class GltfDocument {
   /// Returns a buffer with as many bytes as it declares.
   const Buffer& buffer(std::uint64_t index);
   [[nodiscard]] View find_view(std::uint64_t index);
+  void find_replaced(const Json& sparse, const std::string& name, Elements& found);
+  class Replacement;
   /// A stream of meshoptimizer.
   struct Stream {
     View view;  ///< of its bytes

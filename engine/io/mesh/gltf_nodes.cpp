@@ -161,6 +161,12 @@ class NodeWalk {
   // Notes the mesh and the light of a node.
   void add_shown(std::uint64_t index, const Json& node, const glm::dmat4& world) {
     if (const auto mesh = document_.unsigned_at(node, "mesh")) {
+      const auto weights = node.find("weights");
+      const auto is_weight = [](const Json& weight) {
+        return weight.is_number() && weight.get<double>() != 0;
+      };
+      if (weights != node.end() && std::ranges::any_of(*weights, is_weight))
+        warnings_.add(kWeightsLeftOut, "node " + std::to_string(index));
       if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
         add_instances(*mesh, index, *instancing, world);
       } else {
@@ -180,7 +186,12 @@ class NodeWalk {
   void add_camera(std::uint64_t index, const Json& node, const glm::dmat4& world) {
     const Json& json = document_.at("cameras", index);
     const Json* const perspective = GltfDocument::member(json, "perspective");
-    if (perspective == nullptr) return;
+    if (perspective == nullptr) {
+      if (cameras_left_out_.insert(index).second)
+        warnings_.add(kCameraLeftOut,
+                      "camera " + std::to_string(index) + ", not a perspective one");
+      return;
+    }
     const double vertical = document_.number_at(*perspective, "yfov", 0.7);
     const double aspect = document_.number_at(*perspective, "aspectRatio", 16.0 / 9);
     auto camera = make_camera(glm::dvec3(world[3]), -glm::dvec3(world[2]), glm::dvec3(world[1]),

@@ -265,6 +265,22 @@ class GltfMesh {
     }
   }
 
+  // Tells what of a mesh is not read, once.
+  void warn_of_mesh(std::uint64_t index) {
+    if (!told_.insert(index).second) return;
+    const Json& mesh = document_.at("meshes", index);
+    const auto is_weight = [](const Json& weight) {
+      return weight.is_number() && weight.get<double>() != 0;
+    };
+    const auto weights = mesh.find("weights");
+    if (weights != mesh.end() && std::ranges::any_of(*weights, is_weight))
+      warnings_.add(kWeightsLeftOut, "mesh " + std::to_string(index));
+    for (const Json& json : mesh["primitives"]) {
+      if (document_.unsigned_at(json, "mode").value_or(4) < 4)
+        warnings_.add(kPrimitiveLeftOut, "mesh " + std::to_string(index));
+    }
+  }
+
   void add_mesh(std::uint64_t index, const glm::dmat4& world) {
     for_primitives(index, [&](const Json& json, GltfPrimitive& primitive) {
       const GltfMaterial& material = materials_.use(document_.unsigned_at(json, "material"), soup_);
@@ -274,6 +290,7 @@ class GltfMesh {
       add_vertices(primitive, material, world);
       add_triangles(primitive, base, material, mirrors(world));
     });
+    warn_of_mesh(index);
   }
 
   // Appends positions, normals and texture coordinates, as many of each; missing ones are 0.
@@ -331,8 +348,8 @@ class GltfMesh {
     const auto index = primitive.accessor("COLOR_0");
     if (!index) return;
     const Json& accessor = document_.at("accessors", *index);
-    if (!primitive.is_compressed("COLOR_0") &&
-        (accessor.contains("sparse") || !accessor.contains("bufferView"))) {
+    if (!primitive.is_compressed("COLOR_0") && !accessor.contains("sparse") &&
+        !accessor.contains("bufferView")) {
       warnings_.add(kColoursLeftOut, "accessor " + std::to_string(*index));
       return;
     }
@@ -375,8 +392,9 @@ class GltfMesh {
   }
 
   GltfDocument document_;
-  MeshRoom room_;  // what is left of it
-  MeshSoup soup_;  // of the meshes that are read together
+  MeshRoom room_;                 // what is left of it
+  MeshSoup soup_;                 // of the meshes that are read together
+  std::set<std::uint64_t> told_;  // meshes whose warnings are made
   std::vector<GltfUse> uses_;
   std::map<std::uint64_t, std::uint64_t> times_;  // places of a mesh that can be inverted
   MeshWarnings warnings_;

@@ -8,11 +8,13 @@
 //   o NAME             object of what follows  g NAME ...            group of what follows
 //
 // Groups count as objects in files that have no objects before them. Statements of other kinds
-// (curves, smoothing) are skipped. Positions, normals and texture coordinates are counted
-// separately; negative indices count backwards from the last one read.
+// (curves, lines) are left out and told; smoothing groups mean nothing here. Positions, normals and
+// texture coordinates are counted separately; negative indices count backwards from the last one
+// read.
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <functional>
 #include <map>
 #include <new>
 #include <set>
@@ -88,6 +90,9 @@ class ObjMesh {
     } else if (keyword == "o" || (keyword == "g" && !has_objects_)) {
       has_objects_ |= keyword == "o";
       use_object(std::string(words.rest()));
+    } else if (!keyword.empty() && keyword != "g" && keyword != "s" && told_.size() < kMostTold &&
+               told_.emplace(keyword).second) {
+      warnings_.add(kStatementLeftOut, "'" + std::string(keyword) + "'");
     }
   }
 
@@ -238,7 +243,9 @@ class ObjMesh {
   ByteStream stream_;
   std::string joined_;  // the line of next_logical_line() when it was joined
   MeshSoup soup_;
+  static constexpr std::size_t kMostTold = 64;
   MeshWarnings warnings_;
+  std::set<std::string, std::less<>> told_;  // statements that are left out
   TextureLoader textures_;
   std::set<std::string> libraries_;               // paths of libraries that were read
   std::map<std::string, Material> defined_;       // materials of the libraries by name

@@ -6,6 +6,7 @@
 #include "engine/io/cloud/ply.h"
 #include "engine/io/image/srgb.h"
 #include "engine/io/mesh/mesh_soup.h"
+#include "engine/io/mesh/mesh_warnings.h"
 
 namespace ptc {
 namespace {
@@ -42,7 +43,7 @@ class PlyMesh {
       }
     }
     reader_.require_end();
-    return mesh_file(std::move(soup_), {}, {});
+    return mesh_file(std::move(soup_), {}, warnings_.lines());
   }
 
  private:
@@ -103,6 +104,8 @@ class PlyMesh {
       throw DataError(path_.string() + ": PLY element '" + element.name +
                       "' lacks a list of integers vertex_indices");
     }
+    if (element.count > 0 && element.find_any({"red", "diffuse_red"}))
+      warnings_.add(kFaceColourLeftOut, "element '" + element.name + "'");
     PlyRecord record;
     for (std::uint64_t i = 0; i < element.count; ++i) {
       reader_.read(element, record);
@@ -151,6 +154,7 @@ class PlyMesh {
   std::optional<std::array<std::size_t, 2>> uv_;
   std::optional<std::array<std::size_t, 3>> colour_;
   MeshSoup soup_;
+  MeshWarnings warnings_;
   std::vector<Corner> corners_;
 };
 

@@ -36,8 +36,8 @@ inline constexpr WarningKind kAlphaLeftOut{
     "the alpha of a list of vertex colours is left out",
     "lists of vertex colours lose their alpha, which is left out"};
 inline constexpr WarningKind kColoursLeftOut{
-    "colours of vertices are left out, because they are stored sparsely",
-    "lists of colours of vertices are left out, because they are stored sparsely"};
+    "colours of vertices are left out, because they are not in the file",
+    "lists of colours of vertices are left out, because they are not in the file"};
 inline constexpr WarningKind kExtensionLeftOut{"an extension of glTF is left out",
                                                "extensions of glTF are left out"};
 inline constexpr WarningKind kSkinLeftOut{
@@ -47,6 +47,17 @@ inline constexpr WarningKind kMorphLeftOut{
     "an animation of morph targets is left out and its mesh keeps the shape in which it is stored",
     "animations of morph targets are left out and their meshes keep the shapes in which they are "
     "stored"};
+inline constexpr WarningKind kWeightsLeftOut{
+    "weights of morph targets are left out and their mesh keeps the shape in which it is stored",
+    "weights of morph targets are left out and their meshes keep the shapes in which they are "
+    "stored"};
+inline constexpr WarningKind kPrimitiveLeftOut{"a primitive of points or lines is left out",
+                                               "primitives of points or lines are left out"};
+inline constexpr WarningKind kStatementLeftOut{"a kind of statement is left out",
+                                               "kinds of statements are left out"};
+inline constexpr WarningKind kFaceColourLeftOut{
+    "the colours of faces are left out, because only those of vertices are read",
+    "colours of faces are left out, because only those of vertices are read"};
 inline constexpr WarningKind kAnimationLeftOut{"a part of an animation is left out",
                                                "parts of animations are left out"};
 inline constexpr WarningKind kObjectsLeftOut{

@@ -1,10 +1,12 @@
-// The materials of OBJ files. Statements that are not understood are skipped.
+// The materials of OBJ files. Statements that are not understood are left out and told.
 #include "engine/io/mesh/mtl.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <set>
 #include <utility>
 
 #include "engine/io/text/byte_stream.h"
@@ -72,6 +74,9 @@ class MtlReader {
       if (!name.empty()) current_->emission_texture = textures_.load(name);
       // A map alone is the emission
       if (current_->emission_texture && !emission_given_) current_->emission = glm::vec3(1);
+    } else if (!keyword.empty() && keyword != "illum" && told_.size() < kMostTold &&
+               told_.emplace(keyword).second) {
+      warnings_.add(kStatementLeftOut, "'" + std::string(keyword) + "' of materials");
     }
   }
 
@@ -121,6 +126,8 @@ class MtlReader {
   TextureLoader& textures_;
   std::map<std::string, Material>& materials_;
   MeshWarnings& warnings_;
+  static constexpr std::size_t kMostTold = 64;
+  std::set<std::string, std::less<>> told_;  // statements that are left out
   Material* current_ = nullptr;
   bool emission_given_ = false;  // Ke of the current material
 };
