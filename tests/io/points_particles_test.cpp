@@ -136,7 +136,7 @@ TEST_CASE("ptc: positions, normals, radii, radiance and channels are read", "[io
   CHECK(cloud.value(0, "area") == 7);
   CHECK(cloud.channel("m").components == 16);
   CHECK(cloud.value(1, "m", 15) == 15);
-  CHECK(cloud.notes() == "The channel '_radiosity' is taken as radiance or albedo.");
+  CHECK(cloud.notes() == "The channel '_radiosity' is taken as radiance, emission or albedo.");
 }
 
 TEST_CASE("ptc: every truncation and every longer file is refused", "[io][points]") {

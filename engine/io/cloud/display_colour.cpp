@@ -9,6 +9,7 @@
 
 #include "engine/io/cloud/packed_number.h"
 #include "engine/io/cloud/points.h"
+#include "engine/io/cloud/srgb_curve.h"
 #include "engine/io/image/srgb.h"
 
 namespace ptc {
@@ -44,6 +45,11 @@ std::array<std::uint16_t, 3> to_srgb(const glm::vec3& light, double white) {
   return {number(light.r), number(light.g), number(light.b)};
 }
 
+// Returns a share of 65535 as one of 255, to the nearest.
+std::uint8_t to_byte(std::uint16_t wide) {
+  return static_cast<std::uint8_t>((wide * 255U + 32767) / 65535);
+}
+
 }  // namespace
 
 DisplayColour::DisplayColour(const PointWriteInfo& info)
@@ -70,10 +76,14 @@ std::array<std::uint16_t, 3> DisplayColour::srgb(const Surfel& surfel, const std
 }
 
 std::array<std::uint8_t, 3> DisplayColour::bytes(const Surfel& surfel, const std::byte* row) const {
-  const std::array<std::uint16_t, 3> wide = srgb(surfel, row);
   std::array<std::uint8_t, 3> bytes{};
-  for (std::size_t i = 0; i < 3; ++i)
-    bytes[i] = static_cast<std::uint8_t>((wide[i] * 255U + 32767) / 65535);  // to the nearest
+  if (shows_stored(surfel, row)) {
+    const std::array<std::uint16_t, 3> stored = stored_integers(row);
+    for (std::size_t i = 0; i < 3; ++i)
+      bytes[i] = stores_bytes() ? static_cast<std::uint8_t>(stored[i]) : to_byte(stored[i]);
+    return bytes;
+  }
+  std::ranges::transform(to_srgb(linear(surfel, row), 65535), bytes.begin(), to_byte);
   return bytes;
 }
 
@@ -85,6 +95,10 @@ std::vector<RowChannel> DisplayColour::without_stored(std::vector<RowChannel> ch
   if (kind_ == Kind::stored)
     std::erase_if(channels, [&](const RowChannel& c) { return c.offset == source_->offset; });
   return channels;
+}
+
+bool DisplayColour::is_recoloured(const Surfel& surfel, const std::byte* row) const {
+  return kind_ == Kind::stored && knows(row) && !shows_stored(surfel, row);
 }
 
 bool DisplayColour::stores_bytes() const noexcept {
@@ -99,13 +113,22 @@ bool DisplayColour::shows_stored(const Surfel& surfel, const std::byte* row) con
   return std::max({apart.r, apart.g, apart.b}) <= kRounding;
 }
 
+std::array<std::uint16_t, 3> DisplayColour::stored_integers(const std::byte* row) const {
+  const std::int64_t white = stores_bytes() ? 255 : 65535;
+  std::array<std::uint16_t, 3> values{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t value = load_integer(source_->channel.type, source_->at(row, i));
+    values[i] = static_cast<std::uint16_t>(std::min(value, white));
+  }
+  return values;
+}
+
 glm::vec3 DisplayColour::stored_light(const std::byte* row) const {
-  const double white = stores_bytes() ? 255 : 65535;
+  const std::array<std::uint16_t, 3> values = stored_integers(row);
   glm::vec3 light;
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto value =
-        static_cast<double>(load_integer(source_->channel.type, source_->at(row, i)));
-    light[static_cast<int>(i)] = static_cast<float>(srgb_to_linear(std::min(value / white, 1.0)));
+    light[static_cast<int>(i)] =
+        stores_bytes() ? srgb_curve<255>()[values[i]] : srgb_curve<65535>()[values[i]];
   }
   return light;
 }
@@ -117,13 +140,9 @@ bool DisplayColour::knows(const std::byte* row) const noexcept {
 std::array<std::uint16_t, 3> DisplayColour::stored_values(const Surfel& surfel,
                                                           const std::byte* row) const {
   if (!knows(row)) return to_srgb(surfel.albedo, stored_white());
-  const std::int64_t most = stores_bytes() ? 255 : 65535;
-  const std::int64_t factor = static_cast<std::int64_t>(stored_white()) / most;
-  std::array<std::uint16_t, 3> values{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t value = load_integer(source_->channel.type, source_->at(row, i));
-    values[i] = static_cast<std::uint16_t>(factor * std::min(value, most));
-  }
+  const int factor = static_cast<int>(stored_white()) / (stores_bytes() ? 255 : 65535);
+  std::array<std::uint16_t, 3> values = stored_integers(row);
+  for (std::uint16_t& value : values) value = static_cast<std::uint16_t>(factor * value);
   return values;
 }
 

@@ -33,6 +33,8 @@ class DisplayColour {
   }
   /// Says whether the numbers of stored(), which is not null, are bytes, even in wider fields.
   [[nodiscard]] bool stores_bytes() const noexcept;
+  /// Says whether a point has an albedo that does not come from the numbers of stored().
+  [[nodiscard]] bool is_recoloured(const Surfel& surfel, const std::byte* row) const;
   /// Says whether the colour takes the place of the albedo.
   [[nodiscard]] bool hides_albedo() const noexcept { return chosen_; }
   /// Returns the colour, linear, each component in [0, 1]: that of stored() where the point's
@@ -60,6 +62,8 @@ class DisplayColour {
   [[nodiscard]] bool knows(const std::byte* row) const noexcept;
   /// Says whether the numbers of stored() are the colour of a point.
   [[nodiscard]] bool shows_stored(const Surfel& surfel, const std::byte* row) const;
+  /// Returns the numbers of stored(), cut to white.
+  [[nodiscard]] std::array<std::uint16_t, 3> stored_integers(const std::byte* row) const;
   [[nodiscard]] glm::vec3 stored_light(const std::byte* row) const;
   /// Returns which of stored_values() is white.
   [[nodiscard]] double stored_white() const noexcept;

@@ -95,9 +95,11 @@ class PcdWriter : public CheckedWriter {
     if (info_.grid) std::erase_if(channels_, is_cell);  // WIDTH and HEIGHT say the same
   }
 
-  // Says whether the albedo has fields of its own, beside a colour of 8 bits.
+  // Says whether the albedo has fields of its own, beside a colour of 8 bits. It has none where
+  // that colour is all that the points have.
   [[nodiscard]] bool has_albedo_fields() const {
-    return info_.has_albedo && (colour_.hides_albedo() || colour_.stored() == nullptr);
+    const bool is_colour = colour_.stored() != nullptr && colour_.stores_bytes();
+    return info_.has_albedo && (colour_.hides_albedo() || !is_colour);
   }
 
   [[nodiscard]] std::string make_header() const {

@@ -13,6 +13,7 @@
 #include "engine/base/error.h"
 #include "engine/io/cloud/channel_names.h"
 #include "engine/io/cloud/packed_number.h"
+#include "engine/io/cloud/srgb_curve.h"
 #include "engine/io/cloud/surfel_check.h"
 #include "engine/io/image/srgb.h"
 
@@ -37,27 +38,7 @@ bool is_float(ChannelType type) {
   return type == ChannelType::f32 || type == ChannelType::f64;
 }
 
-// Tabulates the sRGB curve for integers up to `most`.
-std::vector<float> tabulate(std::size_t most) {
-  std::vector<float> curve(most + 1);
-  for (std::size_t i = 0; i <= most; ++i) {
-    curve[i] =
-        static_cast<float>(srgb_to_linear(static_cast<double>(i) / static_cast<double>(most)));
-  }
-  return curve;
-}
-
-const std::vector<float>& curve8() {
-  static const std::vector<float> kCurve = tabulate(255);
-  return kCurve;
-}
-
-const std::vector<float>& curve16() {
-  static const std::vector<float> kCurve = tabulate(65535);
-  return kCurve;
-}
-
-double look_up(const std::vector<float>& curve, double stored) {
+double look_up(std::span<const float> curve, double stored) {
   if (!(stored >= 0 && stored < static_cast<double>(curve.size()))) {
     return std::numeric_limits<double>::quiet_NaN();
   }
@@ -175,7 +156,11 @@ void PointLayout::find_colours(const LayoutRules& rules) {
     });
   };
   if (!indices && are_colours(kShortColour)) indices = find_triple(kShortColour);
-  if (are_colours(kStoredColour)) indices = find_triple(kStoredColour);
+  const auto is_byte = [&](std::size_t index) {
+    return fields_[index].channel.type == ChannelType::u8;
+  };
+  if (are_colours(kStoredColour) && (!indices || std::ranges::all_of(*indices, is_byte)))
+    indices = find_triple(kStoredColour);
   const auto is_number = [&](std::string_view name) {
     const auto index = find(name);
     return index && is_float(fields_[*index].channel.type);
@@ -183,6 +168,7 @@ void PointLayout::find_colours(const LayoutRules& rules) {
   if (std::ranges::all_of(kAlbedo, is_number)) {
     albedo_ = numbers(find_triple(kAlbedo));
     const bool linear = rules.float_colours == FloatColours::unbounded;
+    if (linear) curves_.fill(Curve::clamped);
     if (indices) keep_colours(*indices, linear ? ColourSpace::rec709 : ColourSpace::srgb);
     return;
   }
@@ -264,9 +250,9 @@ double PointLayout::albedo_of(double stored, Curve curve) {
     case Curve::srgb:
       return stored >= 0 && stored <= 1 ? srgb_to_linear(stored) : stored;
     case Curve::srgb8:
-      return look_up(curve8(), stored);
+      return look_up(srgb_curve<255>(), stored);
     case Curve::srgb16:
-      return look_up(curve16(), stored);
+      return look_up(srgb_curve<65535>(), stored);
     case Curve::linear:
       break;
   }

@@ -76,6 +76,15 @@ std::string number_text(ChannelType type, std::uint64_t bits) {
   return std::isnan(number) ? "nan" : fmt::format("{}", number);
 }
 
+// Says whether the colour that viewers show takes the place of the channel that stores it: in PLY
+// and PCD, one of bytes; in BGEO and PTC, where it is of floats, any.
+bool packs(OutputFormat format, const DisplayColour& colour) {
+  if (colour.stored() == nullptr) return false;
+  const bool has_bytes = format == OutputFormat::ply || format == OutputFormat::pcd;
+  const bool has_floats = format == OutputFormat::bgeo || format == OutputFormat::ptc;
+  return has_floats || (has_bytes && colour.stores_bytes());
+}
+
 }  // namespace
 
 void CheckedWriter::write(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
@@ -129,6 +138,15 @@ std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info)
   std::vector<std::string> sentences = entry_of(format).losses(info);
   const std::vector<std::string> unknown = unknown_losses(format, info);
   sentences.insert(sentences.end(), unknown.begin(), unknown.end());
+  const DisplayColour colour(info);
+  const bool may_differ =
+      info.has_albedo && !colour.hides_albedo() && (!info.rounding || info.rounding->recoloured);
+  if (may_differ && packs(format, colour)) {
+    sentences.push_back(
+        "Points whose albedo is not their stored colour keep the albedo alone: "
+        "the channel " +
+        colour.stored()->channel.name + " is left out.");
+  }
   for (const Channel& channel : info.channels) {
     if (channel_bytes(channel.type) != 0) continue;
     sentences.push_back("The channel " + channel.name +
@@ -139,13 +157,8 @@ std::vector<std::string> losses(OutputFormat format, const PointWriteInfo& info)
 
 std::vector<std::string> unknown_losses(OutputFormat format, const PointWriteInfo& info) {
   if (format == OutputFormat::las) return las_unknown_losses(info);
-  // The colour that viewers show takes the place of the channel: in PLY and PCD, one of bytes; in
-  // BGEO and PTC, where it is of floats, any
   const DisplayColour colour(info);
-  const bool has_bytes = format == OutputFormat::ply || format == OutputFormat::pcd;
-  const bool has_floats = format == OutputFormat::bgeo || format == OutputFormat::ptc;
-  const bool packs_colour =
-      colour.stored() != nullptr && (has_floats || (has_bytes && colour.stores_bytes()));
+  const bool packs_colour = packs(format, colour);
   std::vector<std::string> values, sentences;
   for (const Channel& channel : info.channels) {
     if (!channel.no_value || channel_bytes(channel.type) == 0) continue;

@@ -60,6 +60,7 @@ struct Rounding {
   double step_error = 0;
   bool normals = false;            ///< 16 bits for each of two angles change a normal
   bool albedos = false;            ///< 16 bits on the sRGB curve change an albedo
+  bool recoloured = false;         ///< a point has an albedo that is not its stored colour
   std::set<std::string> channels;  ///< those with a value that their type in the file does not hold
 };
 

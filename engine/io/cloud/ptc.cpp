@@ -126,10 +126,11 @@ class PtcSource : public RecordSource {
       if (type == "normal") channel.role = ChannelRole::direction;
       const std::size_t before = fields_.size(), offset = kPackedCore + found * sizeof(float);
       add_attribute(channel, offset, fields_);
-      if (channel.name == "_radiosity" && components == 3) radiosity_ = offset;
-      if (channel.name == "_emission" && components == 3) emission_ = offset;
       if (!fields_[before].plain) {
-        notes_.push_back("The channel '" + channel.name + "' is taken as radiance or albedo.");
+        if (channel.name == "_radiosity") radiosity_ = offset;
+        if (channel.name == "_emission") emission_ = offset;
+        notes_.push_back("The channel '" + channel.name +
+                         "' is taken as radiance, emission or albedo.");
       }
       found += components;
     }

@@ -31,6 +31,12 @@ const char* type_name(const Channel& channel) {
   return has_axes(channel) ? "vector" : "color";
 }
 
+constexpr const char* kArea = "_area";
+
+bool is_area(const RowChannel& row) {
+  return row.name == kArea && row.channel.components == 1;
+}
+
 class PtcWriter : public CheckedWriter {
  public:
   PtcWriter(const std::filesystem::path& target, const PointWriteInfo& info)
@@ -39,8 +45,7 @@ class PtcWriter : public CheckedWriter {
         colour_(info),
         channels_(colour_.without_stored(
             row_channels(info.channels, {"_radiosity", "_albedo", "_emission"}))),
-        has_own_area_(std::ranges::any_of(channels_,
-                                          [](const RowChannel& row) { return row.name == kArea; })),
+        has_own_area_(std::ranges::any_of(channels_, &is_area)),
         out_(target) {
     declare_variables();
     const std::vector<std::byte> header = make_header();
@@ -97,6 +102,10 @@ class PtcWriter : public CheckedWriter {
     if (colour_.exists()) put_value(colour_.linear(surfel, row));
     if (info_.emits) put_value(surfel.emission);
     for (const RowChannel& channel : channels_) {
+      if (info_.has_radius && is_area(channel) && is_unknown(channel.channel, channel.at(row, 0))) {
+        put_value(2 * surfel.radius * surfel.radius);
+        continue;
+      }
       for (std::size_t i = 0; i < channel.channel.components; ++i) {
         put_value(static_cast<float>(load_number(channel.at(row, i), channel.channel.type)));
       }
@@ -110,8 +119,6 @@ class PtcWriter : public CheckedWriter {
   }
 
   [[nodiscard]] bool makes_area() const noexcept { return info_.has_radius && !has_own_area_; }
-
-  static constexpr const char* kArea = "_area";
 
   PointWriteInfo info_;
   DisplayColour colour_;

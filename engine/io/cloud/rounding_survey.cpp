@@ -104,6 +104,7 @@ RoundingSurvey::RoundingSurvey(OutputFormat format, const PointWriteInfo& info)
       decimals_(format == OutputFormat::las),
       normals_(format == OutputFormat::ptc && info.has_normals),
       albedos_(format == OutputFormat::las && info.has_albedo),
+      colour_(info),
       row_bytes_(row_bytes(info.channels)) {
   if (format == OutputFormat::las) {
     const las::Head head = las::plan_head({.channels = {}, .text = info.text, .bounds = {}});
@@ -116,8 +117,11 @@ RoundingSurvey::RoundingSurvey(OutputFormat format, const PointWriteInfo& info)
 }
 
 void RoundingSurvey::add(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
+  const std::byte* row = rows.data();
   for (const Surfel& surfel : surfels) {
     add_position(surfel.position);
+    rounding_.recoloured = rounding_.recoloured || colour_.is_recoloured(surfel, row);
+    row += row_bytes_;
     if (normals_ && !rounding_.normals)
       rounding_.normals = !is_near(surfel.normal, unpack_normal(pack_normal(surfel.normal)));
     if (albedos_ && !rounding_.albedos) rounding_.albedos = !fits_words(surfel.albedo);

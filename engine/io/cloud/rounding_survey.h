@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/base/surfel.h"
+#include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
 #include "engine/io/cloud/rounding.h"
@@ -45,6 +46,7 @@ class RoundingSurvey {
   bool normals_;                // the format packs normals
   bool albedos_;                // the format packs colours
   std::optional<Steps> steps_;  // of the LAS file that the points came from
+  DisplayColour colour_;
   std::size_t row_bytes_;
   std::vector<Watched> watched_;
   Rounding rounding_;

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include "engine/base/error.h"
+#include "engine/io/cloud/checked_writer.h"
+#include "engine/io/cloud/display_colour.h"
 #include "engine/io/cloud/las_places.h"
 #include "engine/io/cloud/las_plan.h"
 #include "engine/io/cloud/packed_number.h"
@@ -42,21 +44,26 @@ constexpr std::array kSurfelColumns = std::to_array<SurfelColumn>({
     {"emission_b", emission},
 });
 
-// How far numbers may be off: `share` of their range, and the last bits of floats.
+constexpr double kShare = 1e-4;  // of the range by which numbers may be off
+// The last bits of floats and of doubles, of the greatest magnitude
+constexpr double kFloatStep = 0x1p-22, kDoubleStep = 0x1p-44;
+
+// How far numbers may be off besides.
 struct Tolerance {
-  double share = 1e-4;
   double absolute = 0;
+  double step = kDoubleStep;  // of the greatest magnitude
 };
-constexpr double kFloatStep = 0x1p-22;  // of the greatest magnitude
 
 bool agree(const ColumnFacts& written, const ColumnFacts& read, const Tolerance& tolerance) {
   if (written.known != read.known) return false;
   if (written.known == 0) return true;
   const double magnitude = std::max(std::abs(written.low), std::abs(written.high));
-  const double most = std::max(tolerance.absolute, tolerance.share * (written.high - written.low)) +
-                      kFloatStep * magnitude;
+  const auto count = static_cast<double>(written.known);
+  const double most = std::max(tolerance.absolute, kShare * (written.high - written.low)) +
+                      (tolerance.step + 0x1p-52 * count) * magnitude;
   return std::abs(written.low - read.low) <= most && std::abs(written.high - read.high) <= most &&
-         std::abs(written.mean() - read.mean()) <= most;
+         std::abs(written.mean() - read.mean()) <= most &&
+         std::abs(written.weighted - read.weighted) / count <= most;
 }
 
 std::string text_of(const ColumnFacts& facts) {
@@ -67,18 +74,23 @@ std::string text_of(const ColumnFacts& facts) {
 
 [[noreturn]] void refuse(const std::filesystem::path& target, std::string_view name,
                          const ColumnFacts& written, const ColumnFacts& read) {
-  throw DataError(fmt::format("{}: {} was written with {}, but the file has {}", target.string(),
-                              name, text_of(written), text_of(read)));
+  const std::string what =
+      text_of(written) == text_of(read) ? "them at other points" : text_of(read);
+  throw DataError(fmt::format("{}: {} was written with {}, but the file, which is kept, has {}",
+                              target.string(), name, text_of(written), what));
 }
 
 }  // namespace
 
 void ColumnFacts::add(double value) noexcept {
-  if (!std::isfinite(value)) {
+  // Fractions of the multiples of the golden ratio are evenly spread
+  const std::uint64_t place = (known + unknown) * 0x9e3779b97f4a7c15U;
+  if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
     ++unknown;
     return;
   }
   ++known;
+  weighted += value * (static_cast<double>(place >> 11) * 0x1p-53);
   low = std::min(low, value);
   high = std::max(high, value);
   sum += value;
@@ -114,12 +126,10 @@ void PointColumns::add(std::span<const Surfel> surfels, std::span<const std::byt
       ColumnFacts& facts = parts_[c][k];
       const std::byte* at = row.at(rows.data(), k);
       for (std::size_t i = 0; i < surfels.size(); ++i, at += row_bytes_) {
-        if (meant && is_unknown(channel, at)) {
-          ++facts.unknown;
-          continue;
-        }
         const double number = load_number(at, channel.type);
-        facts.add(meant ? number * channel.scale + channel.offset : number);
+        facts.add(!meant                    ? number
+                  : is_unknown(channel, at) ? std::numeric_limits<double>::quiet_NaN()
+                                            : number * channel.scale + channel.offset);
       }
     }
   }
@@ -153,22 +163,25 @@ void WrittenCheck::add(std::span<const Surfel> surfels, std::span<const std::byt
   if (meant_) meant_->add(surfels, rows);
 }
 
-std::vector<std::string> WrittenCheck::compare(const std::filesystem::path& target) const {
+std::vector<std::string> WrittenCheck::compare(const std::filesystem::path& target,
+                                               Progress& progress) const {
   std::vector<std::string> others;
   if (!is_read()) return others;
   const PointFile file = open_points(target);
   PointColumns read(file.info.channels, PointColumns::Values::meant);
   std::vector<Surfel> block(kBlock);
-  while (const std::size_t count = file.source->next(block))
+  while (const std::size_t count = file.source->next(block)) {
     read.add(std::span(block).first(count), file.source->attributes());
+    progress.advance(count);
+  }
   if (read.points() != stored_.points()) {
-    throw DataError(fmt::format("{}: {} points were written, but the file has {}", target.string(),
-                                stored_.points(), read.points()));
+    throw DataError(fmt::format("{}: {} points were written, but the file, which is kept, has {}",
+                                target.string(), stored_.points(), read.points()));
   }
   if (read.points() == 0) return others;
   compare_surfels(target, file.info, read);
   for (const RowChannel& row : row_channels(info_.channels, {})) {
-    if (is_held_otherwise(row.channel)) continue;
+    if (is_held_otherwise(row)) continue;
     if (!compare_channel(target, row, read)) others.push_back(row.channel.name);
   }
   return others;
@@ -176,14 +189,17 @@ std::vector<std::string> WrittenCheck::compare(const std::filesystem::path& targ
 
 void WrittenCheck::compare_surfels(const std::filesystem::path& target, const PointFileInfo& file,
                                    const PointColumns& read) const {
-  // Says of a quantity whether it was written, and whether the file has it
+  // Says of a quantity whether it was written, and whether the file has it. Colours of a viewer are
+  // not compared: the albedo, where they take its place
+  const DisplayColour colour(info_);
+  const bool is_shown = colour.stored() != nullptr || colour.hides_albedo() ||
+                        std::ranges::any_of(info_.channels, &is_linear_colour);
   const auto is_written = [&](Quantity of) {
-    const bool shown = info_.colour_from.empty();  // else viewers see another colour
     return std::array{true,
                       info_.has_normals,
                       info_.has_radius,
                       info_.has_radiance,
-                      info_.has_albedo && shown,
+                      info_.has_albedo && !is_shown && format_ != OutputFormat::las,
                       info_.emits}[of];
   };
   const auto is_found = [&](Quantity of) {
@@ -204,8 +220,13 @@ void WrittenCheck::compare_surfels(const std::filesystem::path& target, const Po
   for (std::size_t i = 0; i < kSurfelColumns.size(); ++i) {
     const auto& [name, of] = kSurfelColumns[i];
     if (!is_written(of)) continue;
-    Tolerance tolerance;
-    if (of == position) tolerance.absolute = steps[static_cast<int>(i)];
+    Tolerance tolerance{.step = kFloatStep};
+    if (of == position) {
+      tolerance.absolute = steps[static_cast<int>(i)];
+      const bool has_doubles = format_ == OutputFormat::las || format_ == OutputFormat::ply ||
+                               format_ == OutputFormat::xyz;
+      if (has_doubles) tolerance.step = kDoubleStep;
+    }
     if (of == normal || of == albedo) tolerance.absolute = 0.01;
     if (of == radiance) tolerance.absolute = kFloatStep * brightest;
     const ColumnFacts& written = stored_.surfel(i);
@@ -224,7 +245,12 @@ bool WrittenCheck::compare_channel(const std::filesystem::path& target, const Ro
     const ColumnFacts& stored = *stored_.find(name)->facts;
     const ColumnFacts& meant = meant_ ? *meant_->find(name)->facts : stored;
     const bool scaled = is_scaled(*found->channel);
-    const Tolerance tolerance{.absolute = scaled ? std::abs(found->channel->scale) : 0};
+    const auto is_float = [](ChannelType type) {
+      return type == ChannelType::f32 || type == ChannelType::half;
+    };
+    const bool floats = is_float(row.channel.type) || is_float(found->channel->type);
+    const Tolerance tolerance{.absolute = scaled ? std::abs(found->channel->scale) : 0,
+                              .step = floats ? kFloatStep : kDoubleStep};
     if (!agree(stored, *found->facts, tolerance) && !agree(meant, *found->facts, tolerance))
       refuse(target, name, meant, *found->facts);
   }
@@ -232,9 +258,13 @@ bool WrittenCheck::compare_channel(const std::filesystem::path& target, const Ro
 }
 
 // Says whether a format holds a channel in another way than as a column, or cuts its values.
-bool WrittenCheck::is_held_otherwise(const Channel& channel) const {
+bool WrittenCheck::is_held_otherwise(const RowChannel& row) const {
+  const Channel& channel = row.channel;
   if (info_.grid && (channel.name == "row" || channel.name == "column")) return true;
-  if (format_ == OutputFormat::las && las::needs_range(channel)) return true;  // it is scaled
+  // Fields of LAS have values of their own for "not known", steps and limits
+  if (format_ == OutputFormat::las &&
+      (las::needs_range(channel) || las::place_channel(row, info_.ranges)))
+    return true;
   // The point's colour, and the same from a text
   if (channel.name == "rgb" || channel.name.starts_with("rgb_")) return true;
   return format_ == OutputFormat::bgeo &&

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/base/progress.h"
 #include "engine/base/surfel.h"
 #include "engine/io/cloud/point_rows.h"
 #include "engine/io/cloud/point_writer.h"
@@ -19,12 +20,14 @@ namespace ptc {
 
 /// What is known of one number of all points, such as nx or intensity.
 struct ColumnFacts {
-  std::uint64_t known = 0;    ///< points in which it is finite
+  std::uint64_t known = 0;    ///< points in which it is known
   std::uint64_t unknown = 0;  ///< points in which it is not
   double low = std::numeric_limits<double>::infinity();
   double high = -std::numeric_limits<double>::infinity();
   double sum = 0;
+  double weighted = 0;  ///< sum of the values, each with a weight in [0, 1) that tells its place
 
+  /// Adds the value of the next point. What floats cannot hold counts as unknown.
   void add(double value) noexcept;
   /// Returns the mean of the finite values; 0 when there are none.
   [[nodiscard]] double mean() const noexcept;
@@ -64,20 +67,25 @@ class PointColumns {
 
 /// Compares the points that go into a file with those that come out of it.
 ///
-/// The numbers of points must be equal. Of every number that a reader finds under the name that it
-/// had, the least and the greatest value and the mean must be those that were written, but for what
-/// the type of the file rounds: at most a ten-thousandth of its range, a hundredth for normals and
-/// colours. That finds columns that are missing, swapped, cut or of the wrong type or scale.
+/// The numbers of points must be equal. Of the numbers that a reader finds under the names that
+/// they had, the least and the greatest value, the mean, and a mean with weights that tell points
+/// apart must be those that were written, but for what the file rounds: a ten-thousandth of the
+/// range, a step of LAS, 0.01 for normals and the albedo, and the last bits of floats. That finds
+/// columns and points that are swapped, cut or of the wrong type or scale. Not compared are what a
+/// format holds otherwise, such as fields of LAS or the colour `rgb`, and channels that the file
+/// does not have under their names.
 class WrittenCheck {
  public:
   WrittenCheck(OutputFormat format, const PointWriteInfo& info);
   /// Adds points that were written.
   void add(std::span<const Surfel> surfels, std::span<const std::byte> rows);
   /// Reads the file and compares it. USD files, which are not read, pass.
+  /// @param progress  is advanced by the points that were read
   /// @return the channels that the file does not have under their names, which were not compared;
   ///         none of those that a format holds otherwise, such as bytes of a colour
   /// @throws DataError that names the file and the number that differs; as open_points()
-  [[nodiscard]] std::vector<std::string> compare(const std::filesystem::path& target) const;
+  [[nodiscard]] std::vector<std::string> compare(const std::filesystem::path& target,
+                                                 Progress& progress) const;
 
  private:
   [[nodiscard]] bool is_read() const noexcept;
@@ -85,7 +93,7 @@ class WrittenCheck {
                        const PointColumns& read) const;
   [[nodiscard]] bool compare_channel(const std::filesystem::path& target, const RowChannel& row,
                                      const PointColumns& read) const;
-  [[nodiscard]] bool is_held_otherwise(const Channel& channel) const;
+  [[nodiscard]] bool is_held_otherwise(const RowChannel& row) const;
 
   OutputFormat format_;
   PointWriteInfo info_;

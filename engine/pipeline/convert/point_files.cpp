@@ -162,10 +162,12 @@ std::unique_ptr<PointSource> open_ordered(const ContainerReader& container,
 /// @throws DataError when it differs
 void compare_written(const std::filesystem::path& target, const WrittenCheck& check,
                      Progress& progress) {
-  const std::vector<std::string> others = check.compare(target);
+  const std::vector<std::string> others = check.compare(target, progress);
   if (others.empty()) return;
-  progress.note(fmt::format("{}: not compared, because the file has other names for them: {}.",
-                            target.filename().string(), fmt::join(others, ", ")));
+  progress.note(fmt::format(
+      "{}: {} {} not found under {} in the file, and so not compared with what was written.",
+      target.filename().string(), fmt::join(others, ", "), others.size() == 1 ? "is" : "are",
+      others.size() == 1 ? "its name" : "their names"));
 }
 
 }  // namespace
@@ -277,7 +279,10 @@ ConvertReport container_to_points(const ContainerReader& container,
         open_ordered(container, options, target, sort_bytes, executor);
     copy_points(*source, target, format, info, check, progress);
   }
-  compare_written(target, check, progress);
+  {
+    const Stage stage(report.seconds, progress, "check", info.count, "points");
+    compare_written(target, check, progress);
+  }
   return report;
 }
 
@@ -298,7 +303,10 @@ ConvertReport cloud_to_points(const std::filesystem::path& cloud,
     copy_points(*open_point_input(cloud, options.selection).source, target, format, info, check,
                 progress);
   }
-  compare_written(target, check, progress);
+  {
+    const Stage stage(report.seconds, progress, "check", info.count, "points");
+    compare_written(target, check, progress);
+  }
   return report;
 }
 

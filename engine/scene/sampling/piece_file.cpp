@@ -252,6 +252,17 @@ class PieceFile::LocalMesh {
  public:
   explicit LocalMesh(const MeshParts& parts) : parts_(parts) { mesh_.origin = parts.origin(); }
 
+  /// Makes room for so many more triangles, so that vectors do not grow to twice what they hold.
+  void reserve(std::size_t more) {
+    const std::size_t triangles = mesh_.triangles.size() + more;
+    mesh_.positions.reserve(3 * triangles);
+    if (parts_.has_normals()) mesh_.normals.reserve(3 * triangles);
+    if (parts_.has_uvs()) mesh_.uvs.reserve(3 * triangles);
+    if (parts_.has_colours()) mesh_.colours.reserve(3 * triangles);
+    mesh_.triangles.reserve(triangles);
+    mesh_.material_of.reserve(triangles);
+  }
+
   /// Adds a triangle that is not there yet. @return its index
   std::uint32_t add(const MeshTriangle& triangle) {
     // Triangles of equal positions and material are one
@@ -292,6 +303,7 @@ class PieceFile::LocalMesh {
     const Basis basis(normal);
     const glm::vec3 x = basis.x * glm::dot(glm::abs(basis.x), half),
                     y = basis.y * glm::dot(glm::abs(basis.y), half);
+    if (x == glm::vec3(0) || y == glm::vec3(0)) return;  // a run on a line covers nothing
     const auto vertex = static_cast<std::uint32_t>(mesh_.positions.size());
     for (const glm::vec3& corner : {-x - y, x - y, x + y, -x + y}) {
       mesh_.positions.push_back(middle + corner);
@@ -458,11 +470,13 @@ PieceFile::Patch PieceFile::load(std::size_t patch) const {
   LocalMesh local(parts_);
   std::vector<Row> rows(begins_[patch + 1] - begins_[patch]);
   read_rows(begins_[patch], rows);
+  local.reserve(rows.size());
   for (const Row& row : rows) loaded.pieces.push_back({local.add(row.triangle), row.path});
   // Add what is near it
   if (surfels_of(loaded.before + loaded.weight) > surfels_of(loaded.before)) {
     Surroundings near(*this, patch, rows);
     for (float share = kRunShare; !near.find(share);) share *= 2;
+    local.reserve(near.triangles().size() + 2 * near.runs().size());
     for (const MeshTriangle& triangle : near.triangles()) static_cast<void>(local.add(triangle));
     for (const Run& run : near.runs()) local.add_rectangle(run);
   }
