@@ -14,14 +14,6 @@ Channel channel(const char* name, ChannelType type, std::uint8_t components = 1)
   return {.name = name, .type = type, .components = components};
 }
 
-Channel stored_colour(ChannelType type) {
-  return {.name = "rgb",
-          .type = type,
-          .components = 3,
-          .role = ChannelRole::colour,
-          .colour_space = ColourSpace::srgb};
-}
-
 }  // namespace
 
 TEST_CASE("las writer: the header is that of version 1.4", "[io][writers][las]") {

@@ -236,8 +236,7 @@ TEST_CASE("point writers: a colour of 16 bits comes back to the last bit, whatev
   }
   PointWriteInfo info = plain_info(surfels);
   info.has_albedo = true;
-  info.channels = {channel("rgb", ChannelType::u16, 3, ChannelRole::colour)};
-  info.channels[0].colour_space = ColourSpace::srgb;
+  info.channels = {stored_colour(ChannelType::u16)};
   struct Case {
     const char* name;
     OutputFormat format;
@@ -277,9 +276,7 @@ TEST_CASE("point writers: bytes of a colour in wider fields are written as a col
   const test::TemporaryDirectory scratch;
   const std::vector<Surfel> surfels = surfels_of(1);
   PointWriteInfo info = plain_info(surfels);
-  info.channels = {channel("rgb", ChannelType::u16, 3, ChannelRole::colour)};
-  info.channels[0].colour_space = ColourSpace::srgb;
-  info.channels[0].scale = kByteScale;
+  info.channels = {stored_colour(ChannelType::u16, kByteScale)};
   std::vector<std::byte> rows;
   for (const std::uint16_t v : std::initializer_list<std::uint16_t>{1, 128, 255})
     append_value(rows, v);

@@ -17,15 +17,6 @@ using Catch::Matchers::StartsWith;
 
 namespace {
 
-// Returns a channel of colours as scanners store them.
-Channel stored_colour(ChannelType type) {
-  return {.name = "rgb",
-          .type = type,
-          .components = 3,
-          .role = ChannelRole::colour,
-          .colour_space = ColourSpace::srgb};
-}
-
 std::string behind(const std::string& bytes, const std::string& end) {
   return bytes.substr(bytes.find(end) + end.size());
 }

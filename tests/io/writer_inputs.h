@@ -62,6 +62,14 @@ inline PointWriteInfo full_info(const std::vector<Surfel>& surfels) {
   return info;
 }
 
+/// Returns a channel of colours as scanners store them.
+inline Channel stored_colour(ChannelType type, double scale = 1) {
+  Channel channel{.name = "rgb", .type = type, .components = 3, .role = ChannelRole::colour};
+  channel.colour_space = ColourSpace::srgb;
+  channel.scale = scale;
+  return channel;
+}
+
 /// Writes a whole file in two calls.
 inline void write_points(const std::filesystem::path& path, OutputFormat format,
                          const PointWriteInfo& info, std::span<const Surfel> surfels,

@@ -71,12 +71,6 @@ TEST_CASE("written check: what a format rounds, cuts or holds otherwise is not r
           "[io][writers]") {
   const test::TemporaryDirectory scratch;
   Points points = make_points();
-  const auto rgb = [](ChannelType type, double scale) {
-    Channel channel{.name = "rgb", .type = type, .components = 3, .role = ChannelRole::colour};
-    channel.colour_space = ColourSpace::srgb;
-    channel.scale = scale;
-    return channel;
-  };
   const std::vector<Channel> odd{
       {.name = "scan_angle", .type = ChannelType::i16},
       {.name = "return_number", .type = ChannelType::u8},
@@ -90,8 +84,9 @@ TEST_CASE("written check: what a format rounds, cuts or holds otherwise is not r
       {.name = "signed", .type = ChannelType::i64},
       {.name = "time.of.day", .type = ChannelType::f64, .scale = 0.1, .offset = 3e8},
       {.name = "Label", .type = ChannelType::u8}};
-  const auto colours = GENERATE_COPY(values(
-      {rgb(ChannelType::u8, 1), rgb(ChannelType::u16, 1), rgb(ChannelType::u16, kByteScale)}));
+  const auto colours =
+      GENERATE_COPY(values({stored_colour(ChannelType::u8), stored_colour(ChannelType::u16),
+                            stored_colour(ChannelType::u16, kByteScale)}));
   const bool dark = GENERATE(false, true);
   const double far = GENERATE(0.0, 4e6);
   points.info.channels = odd;

@@ -108,7 +108,7 @@ PointColumns::PointColumns(std::span<const Channel> channels, Values values)
   for (const RowChannel& row : channels_) parts_.emplace_back(row.channel.components);
 }
 
-void PointColumns::add(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
+void PointColumns::add_surfels(std::span<const Surfel> surfels) {
   points_ += surfels.size();
   for (const Surfel& s : surfels) {
     const std::array<double, kSurfelColumns.size()> numbers{
@@ -118,6 +118,9 @@ void PointColumns::add(std::span<const Surfel> surfels, std::span<const std::byt
         double{s.albedo.b},   double{s.emission.r}, double{s.emission.g}, double{s.emission.b}};
     for (std::size_t i = 0; i < numbers.size(); ++i) surfel_[i].add(numbers[i]);
   }
+}
+
+void PointColumns::add_rows(std::span<const std::byte> rows, std::size_t count) {
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     const RowChannel& row = channels_[c];
     const Channel& channel = row.channel;
@@ -125,7 +128,7 @@ void PointColumns::add(std::span<const Surfel> surfels, std::span<const std::byt
     for (std::size_t k = 0; k < channel.components; ++k) {
       ColumnFacts& facts = parts_[c][k];
       const std::byte* at = row.at(rows.data(), k);
-      for (std::size_t i = 0; i < surfels.size(); ++i, at += row_bytes_) {
+      for (std::size_t i = 0; i < count; ++i, at += row_bytes_) {
         const double number = load_number(at, channel.type);
         facts.add(!meant                    ? number
                   : is_unknown(channel, at) ? std::numeric_limits<double>::quiet_NaN()
@@ -159,8 +162,9 @@ bool WrittenCheck::is_read() const noexcept {
 
 void WrittenCheck::add(std::span<const Surfel> surfels, std::span<const std::byte> rows) {
   if (!is_read()) return;
-  stored_.add(surfels, rows);
-  if (meant_) meant_->add(surfels, rows);
+  stored_.add_surfels(surfels);
+  stored_.add_rows(rows, surfels.size());
+  if (meant_) meant_->add_rows(rows, surfels.size());
 }
 
 std::vector<std::string> WrittenCheck::compare(const std::filesystem::path& target,
@@ -171,7 +175,8 @@ std::vector<std::string> WrittenCheck::compare(const std::filesystem::path& targ
   PointColumns read(file.info.channels, PointColumns::Values::meant);
   std::vector<Surfel> block(kBlock);
   while (const std::size_t count = file.source->next(block)) {
-    read.add(std::span(block).first(count), file.source->attributes());
+    read.add_surfels(std::span(block).first(count));
+    read.add_rows(file.source->attributes(), count);
     progress.advance(count);
   }
   if (read.points() != stored_.points()) {

@@ -44,8 +44,10 @@ class PointColumns {
   };
 
   PointColumns(std::span<const Channel> channels, Values values);
-  void add(std::span<const Surfel> surfels, std::span<const std::byte> rows);
+  void add_surfels(std::span<const Surfel> surfels);
+  void add_rows(std::span<const std::byte> rows, std::size_t count);
 
+  /// Returns the number of surfels that were added.
   [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
   [[nodiscard]] const ColumnFacts& surfel(std::size_t column) const { return surfel_[column]; }
   /// A component of a channel.
@@ -98,7 +100,7 @@ class WrittenCheck {
   OutputFormat format_;
   PointWriteInfo info_;
   PointColumns stored_;
-  std::optional<PointColumns> meant_;  // where that differs from what is stored
+  std::optional<PointColumns> meant_;  // of channels, where that differs from what is stored
 };
 
 }  // namespace ptc

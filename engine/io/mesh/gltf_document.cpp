@@ -352,6 +352,13 @@ ByteRange GltfDocument::view(std::uint64_t index) {
   return buffers_[view.buffer]->part(view.offset, view.length);
 }
 
+bool GltfDocument::has_weights(const Json& object) {
+  const auto weights = object.find("weights");
+  return weights != object.end() && std::ranges::any_of(*weights, [](const Json& weight) {
+           return weight.is_number() && weight.get<double>() != 0;
+         });
+}
+
 GltfDocument::Elements GltfDocument::find_shape(std::uint64_t index, std::size_t components,
                                                 std::optional<std::uint64_t> expected) const {
   const Json& accessor = at("accessors", index);
@@ -427,8 +434,7 @@ void GltfDocument::find_replaced(const Json& sparse, const std::string& name, El
   };
   replaced.index_type = unsigned_at(*indices, "componentType").value_or(0);
   const std::uint64_t type = replaced.index_type;
-  constexpr std::uint64_t kUnsignedByte = 5121, kUnsignedShort = 5123, kUnsignedInt = 5125;
-  if (type != kUnsignedByte && type != kUnsignedShort && type != kUnsignedInt)
+  if (type != kGltfUint8 && type != kGltfUint16 && type != kGltfUint32)
     fail(name + " is sparse, and its indices are of no unsigned type");
   place(*indices, gltf_number(type)->bytes, replaced.index_buffer, replaced.index_offset);
   place(*values, gltf_number(found.type)->bytes * found.components, replaced.value_buffer,

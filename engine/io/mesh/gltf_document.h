@@ -49,6 +49,9 @@ class GltfDocument {
   /// Returns an extension of an object, or null.
   [[nodiscard]] static const Json* extension(const Json& object, const char* name);
 
+  /// Says whether a mesh or a node has a weight of a morph target other than 0.
+  [[nodiscard]] static bool has_weights(const Json& object);
+
   /// Refuses the file. @throws DataError "PATH: RULE"
   [[noreturn]] void fail(const std::string& rule) const;
 
@@ -112,9 +115,8 @@ class GltfDocument {
                                     std::optional<std::uint64_t> expected = std::nullopt) const;
   /// Finds the elements of accessors[index].
   /// @param components  numbers in each element
-  /// @param expected    number of elements that there must be, if it is known; an accessor without
-  /// a
-  ///                    buffer view, whose number no bytes justify, needs it, and must be sparse
+  /// @param expected    number of elements that there must be, if it is known. An accessor without
+  ///                    bufferView must be sparse and needs it, for no bytes justify its number
   /// @throws DataError when the accessor breaks a rule or has another shape; std::system_error
   [[nodiscard]] Elements find_elements(std::uint64_t index, std::size_t components,
                                        std::optional<std::uint64_t> expected = std::nullopt);

@@ -161,11 +161,7 @@ class NodeWalk {
   // Notes the mesh and the light of a node.
   void add_shown(std::uint64_t index, const Json& node, const glm::dmat4& world) {
     if (const auto mesh = document_.unsigned_at(node, "mesh")) {
-      const auto weights = node.find("weights");
-      const auto is_weight = [](const Json& weight) {
-        return weight.is_number() && weight.get<double>() != 0;
-      };
-      if (weights != node.end() && std::ranges::any_of(*weights, is_weight))
+      if (GltfDocument::has_weights(node))
         warnings_.add(kWeightsLeftOut, "node " + std::to_string(index));
       if (const Json* const instancing = GltfDocument::extension(node, kInstancing)) {
         add_instances(*mesh, index, *instancing, world);

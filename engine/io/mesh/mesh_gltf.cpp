@@ -269,11 +269,7 @@ class GltfMesh {
   void warn_of_mesh(std::uint64_t index) {
     if (!told_.insert(index).second) return;
     const Json& mesh = document_.at("meshes", index);
-    const auto is_weight = [](const Json& weight) {
-      return weight.is_number() && weight.get<double>() != 0;
-    };
-    const auto weights = mesh.find("weights");
-    if (weights != mesh.end() && std::ranges::any_of(*weights, is_weight))
+    if (GltfDocument::has_weights(mesh))
       warnings_.add(kWeightsLeftOut, "mesh " + std::to_string(index));
     for (const Json& json : mesh["primitives"]) {
       if (document_.unsigned_at(json, "mode").value_or(4) < 4)

@@ -160,8 +160,9 @@ std::unique_ptr<PointSource> open_ordered(const ContainerReader& container,
 
 /// Reads a file that was written and compares it with what went into it.
 /// @throws DataError when it differs
-void compare_written(const std::filesystem::path& target, const WrittenCheck& check,
-                     Progress& progress) {
+void compare_written(const std::filesystem::path& target, const PointWriteInfo& info,
+                     const WrittenCheck& check, ConvertReport& report, Progress& progress) {
+  const Stage stage(report.seconds, progress, "check", info.count, "points");
   const std::vector<std::string> others = check.compare(target, progress);
   if (others.empty()) return;
   progress.note(fmt::format(
@@ -279,10 +280,7 @@ ConvertReport container_to_points(const ContainerReader& container,
         open_ordered(container, options, target, sort_bytes, executor);
     copy_points(*source, target, format, info, check, progress);
   }
-  {
-    const Stage stage(report.seconds, progress, "check", info.count, "points");
-    compare_written(target, check, progress);
-  }
+  compare_written(target, info, check, report, progress);
   return report;
 }
 
@@ -303,10 +301,7 @@ ConvertReport cloud_to_points(const std::filesystem::path& cloud,
     copy_points(*open_point_input(cloud, options.selection).source, target, format, info, check,
                 progress);
   }
-  {
-    const Stage stage(report.seconds, progress, "check", info.count, "points");
-    compare_written(target, check, progress);
-  }
+  compare_written(target, info, check, report, progress);
   return report;
 }
 
