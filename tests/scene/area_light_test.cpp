@@ -221,3 +221,101 @@ TEST_CASE("area light: degenerate and black emitters give no light", "[scene][li
   const DirectLight light(scene, {});
   CHECK(light.irradiance({0, 0, 0}, kUp, {}, 1).local == glm::vec3(0));
 }
+
+namespace {
+
+/// Small emitters in a box of 4 x 2.5 x 4 above a floor, which look any way.
+std::vector<Emitter> scattered(std::size_t count) {
+  Random random(5);
+  const auto vector = [&](double extent) {
+    return glm::vec3(random.between(-extent, extent), random.between(-extent, extent),
+                     random.between(-extent, extent));
+  };
+  std::vector<Emitter> emitters;
+  while (emitters.size() < count) {
+    const glm::vec3 at(random.between(-2, 2), random.between(0, 2.5), random.between(-2, 2));
+    emitters.push_back({{at, at + vector(0.03), at + vector(0.03)},
+                        glm::vec3(static_cast<float>(std::exp(random.between(0, 4))))});
+  }
+  return emitters;
+}
+
+/// A lamp of 4 x 4 at a height above a floor, in squares of two triangles.
+std::vector<Emitter> wide_lamp(float height, int squares) {
+  std::vector<Emitter> emitters;
+  const float side = 4.0F / static_cast<float>(squares);
+  const glm::vec3 x(side, 0, 0), z(0, 0, side);
+  for (int i = 0; i < squares * squares; ++i) {
+    const glm::vec3 at(-2 + side * static_cast<float>(i % squares), height,
+                       -2 + side * static_cast<float>(i / squares));
+    emitters.push_back({{at, at + x, at + x + z}, glm::vec3(1)});
+    emitters.push_back({{at, at + x + z, at + z}, glm::vec3(1)});
+  }
+  return emitters;
+}
+
+/// The light of emitters at places on a floor, from some samples each, against many.
+struct Noise {
+  double mean = 0;  ///< over what it should be
+  double rms = 0;   ///< over the root of the mean square
+};
+
+/// @param wanted  returns the irradiance of a place
+template <class Wanted>
+Noise noise_of(const AreaLights& lights, const Wanted& wanted) {
+  Random random(7);
+  double sum = 0, square = 0, all = 0, all_square = 0;
+  std::vector<EmitterSample> samples;
+  for (std::uint64_t place = 0; place < 100; ++place) {
+    const glm::vec3 at(random.between(-1.8, 1.8), 0, random.between(-1.8, 1.8));
+    const double should = wanted(at);
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      lights.sample(at, kUp, 16, 20 * place + seed, 0, samples);
+      double light = 0;
+      for (const EmitterSample& sample : samples) light += double{sample.irradiance.x};
+      sum += light;
+      square += (light - should) * (light - should);
+      all += should;
+      all_square += should * should;
+    }
+  }
+  return {sum / all, std::sqrt(square / all_square)};
+}
+
+}  // namespace
+
+TEST_CASE("area light: 16 rays tell the light of thousands of emitters", "[scene][lights]") {
+  // Of a wide lamp: the light of the whole square, by the formula for its corners
+  for (const auto& [height, most] : {std::pair(0.3F, 0.08), {0.6F, 0.04}, {2.0F, 0.008}}) {
+    const AreaLights lights(wide_lamp(height, 60));
+    const auto formula = [&](const glm::vec3& at) {
+      double sum = 0;
+      for (const double x : {2.0 - double{at.x}, 2.0 + double{at.x}}) {
+        for (const double z : {2.0 - double{at.z}, 2.0 + double{at.z}})
+          sum += kPiDouble * corner_factor(x, z, double{height});
+      }
+      return sum;
+    };
+    const Noise noise = noise_of(lights, formula);
+    INFO("height " << height << ": mean " << noise.mean << ", RMS " << noise.rms);
+    CHECK(noise.mean == Approx(1).epsilon(0.01));
+    CHECK(noise.rms < most);
+  }
+  // Of scattered ones: the sum of what each brings alone
+  const std::vector<Emitter> emitters = scattered(2000);
+  std::vector<AreaLights> each;
+  for (const Emitter& emitter : emitters) each.emplace_back(std::vector<Emitter>{emitter});
+  const auto one_by_one = [&](const glm::vec3& at) {
+    double sum = 0;
+    std::vector<EmitterSample> samples;
+    for (const AreaLights& light : each) {
+      light.sample(at, kUp, 64, 1, 0, samples);
+      for (const EmitterSample& sample : samples) sum += double{sample.irradiance.x};
+    }
+    return sum;
+  };
+  const Noise noise = noise_of(AreaLights(emitters), one_by_one);
+  INFO("scattered: mean " << noise.mean << ", RMS " << noise.rms);
+  CHECK(noise.mean == Approx(1).epsilon(0.03));
+  CHECK(noise.rms < 0.35);
+}

@@ -2,14 +2,14 @@
 //
 // Three steps, each of which brings the density closer to the light that really arrives:
 //
-//     all emitters --(1)--> at most 64 candidates --(2)--> one emitter --(3)--> a place on it
+//     all emitters --(1)--> candidates --(2)--> one emitter --(3)--> a place on it
 //
-// (1) Of more than 64 emitters, 64 are drawn with replacement in proportion to their power, in
-//     constant time each, by an alias table (Walker 1977, built in Vose's form).
-// (2) A candidate is chosen in proportion to w = e / (64 p), where e estimates the light that it
-//     may give to this point, and p is the probability that step (1) drew it. The sum of all w
-//     estimates the sum of e over all emitters, so that (sum of w) / e corrects for the choice:
-//     resampled importance sampling (Talbot, Cline and Egbert 2005). With all emitters as
+// (1) Of more than 64 emitters, each sample draws neighbours by a tree (EmitterTree), several times
+//     where there are few samples.
+// (2) A candidate is chosen in proportion to w = e / (n p), where e estimates the light that it may
+//     give to this point, p is the probability of its draw, and n the number of draws. The sum of
+//     all w estimates the sum of e over all emitters, so that (sum of w) / e corrects for the
+//     choice: resampled importance sampling (Talbot, Cline and Egbert 2005). With all emitters as
 //     candidates, w = e.
 // (3) The place is uniform in the solid angle that the triangle subtends at the point (Arvo 1995),
 //     where an emitter that is close or large would otherwise flicker:
@@ -35,11 +35,8 @@
 namespace ptc {
 namespace {
 
-constexpr std::size_t kChoices = 64;  // candidates for each point, at most
-
-double brightness(const glm::vec3& c) {
-  return static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
-}
+constexpr std::size_t kFew = 64;      // emitters that are all candidates
+constexpr unsigned kLeastDraws = 16;  // from the tree, over all samples of a point
 
 // An emitter as seen from a point.
 struct View {
@@ -167,101 +164,64 @@ Place sample_place(const View& view, const glm::dvec3& normal, const glm::vec2& 
 }  // namespace
 
 AreaLights::AreaLights(std::vector<Emitter> emitters) : emitters_(std::move(emitters)) {
-  // Keep the emitters that give light, and their power up to a factor.
-  const auto given = [](const Emitter& emitter) {
-    const glm::dvec3 a(emitter.corner[0]);
-    const double area = glm::length(
-        glm::cross(glm::dvec3(emitter.corner[1]) - a, glm::dvec3(emitter.corner[2]) - a));
-    return area * brightness(emitter.radiance);
-  };
-  std::erase_if(emitters_, [&](const Emitter& emitter) {
-    const double power = given(emitter);
+  std::erase_if(emitters_, [](const Emitter& emitter) {
+    const double power = power_of(emitter);
     return !(power > 0) || !std::isfinite(power);
   });
-  std::vector<double> power;
-  power.reserve(emitters_.size());
-  double total = 0;
-  for (const Emitter& emitter : emitters_) {
-    power.push_back(given(emitter));
-    total += power.back();
-  }
-  // Divide the emitters into those below and above the mean power, which is 1 column.
-  const std::size_t count = emitters_.size();
-  table_.resize(count);
-  share_.reserve(count);
-  std::vector<std::uint32_t> small, large;
-  for (std::size_t i = 0; i < count; ++i) {
-    share_.push_back(static_cast<float>(power[i] / total));
-    power[i] *= static_cast<double>(count) / total;
-    (power[i] < 1 ? small : large).push_back(static_cast<std::uint32_t>(i));
-  }
-  // Fill up each column below the mean from an emitter above it (Walker 1977, in Vose's form).
-  while (!small.empty() && !large.empty()) {
-    const std::uint32_t low = small.back();
-    const std::uint32_t high = large.back();
-    small.pop_back();
-    table_[low] = {static_cast<float>(power[low]), high};
-    power[high] -= 1 - power[low];
-    if (power[high] >= 1) continue;
-    large.pop_back();
-    small.push_back(high);
-  }
+  if (emitters_.size() > kFew) tree_ = EmitterTree(emitters_);
 }
 
-std::uint32_t AreaLights::draw(double unit) const {
-  const double scaled = unit * static_cast<double>(table_.size());
-  const auto column =
-      static_cast<std::uint32_t>(std::min(static_cast<std::size_t>(scaled), table_.size() - 1));
-  const double rest = scaled - static_cast<double>(column);
-  return rest < static_cast<double>(table_[column].keep) ? column : table_[column].other;
-}
-
-void AreaLights::choose_all(const glm::vec3& position, const glm::vec3& normal,
-                            std::vector<Choice>& out) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+void AreaLights::choose_from(std::uint32_t first, std::uint32_t end, double weight,
+                             const glm::vec3& position, const glm::vec3& normal,
+                             std::vector<Choice>& out) const {
+  double sum = out.empty() ? 0 : out.back().sum;
+  for (std::uint32_t i = first; i < end; ++i) {
     const double expected = expected_light(emitters_[i], position, normal);
     if (!(expected > 0)) continue;
-    sum += expected;
-    out.push_back({static_cast<std::uint32_t>(i), expected, sum});
+    sum += weight * expected;
+    out.push_back({i, expected, sum});
   }
 }
 
-void AreaLights::choose_by_power(const glm::vec3& position, const glm::vec3& normal,
-                                 std::uint64_t seed, std::vector<Choice>& out) const {
-  const SquarePoints points(seed);
-  double sum = 0;
-  for (std::uint32_t i = 0; i < kChoices; ++i) {
-    const std::uint32_t drawn = draw(points.line(i));
-    const double expected = expected_light(emitters_[drawn], position, normal);
-    if (!(expected > 0)) continue;
-    sum += expected / (static_cast<double>(kChoices) * static_cast<double>(share_[drawn]));
-    out.push_back({drawn, expected, sum});
+double AreaLights::choose_by_tree(const glm::vec3& position, const glm::vec3& normal,
+                                  const SquarePoints& points, std::uint32_t first, unsigned draws,
+                                  std::vector<Choice>& out) const {
+  double rest = 0;
+  for (std::uint32_t i = 0; i < draws; ++i) {
+    const EmitterTree::Drawn drawn = tree_.draw(position, normal, points.line(first + i));
+    choose_from(drawn.first, drawn.end, 1 / (draws * drawn.chance), position, normal, out);
+    rest = drawn.rest;
   }
+  return rest;
 }
 
 void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsigned count,
                         std::uint64_t seed, std::uint32_t first,
                         std::vector<EmitterSample>& out) const {
-  // Find the candidates.
   out.clear();
   thread_local std::vector<Choice> choices;
   choices.clear();
-  if (emitters_.size() <= kChoices) {
-    choose_all(position, normal, choices);
-  } else {
-    choose_by_power(position, normal, seed ^ 1, choices);
+  const bool few = emitters_.size() <= kFew;
+  if (few) {
+    choose_from(0, static_cast<std::uint32_t>(emitters_.size()), 1, position, normal, choices);
+    if (choices.empty()) return;
   }
-  if (choices.empty()) return;
-  // Choose a candidate by its weight for each sample, and a place on it.
   const SquarePoints points(seed);
-  const double total = choices.back().sum;
+  const unsigned draws = std::max(1U, kLeastDraws / std::max(1U, count));
   for (std::uint32_t i = 0; i < count; ++i) {
-    const double wanted = points.line(first + i) * total;
+    // Choose an emitter by its weight
+    double unit = few ? points.line(first + i) : 0;
+    if (!few) {
+      choices.clear();
+      unit = choose_by_tree(position, normal, points, (first + i) * draws, draws, choices);
+      if (choices.empty()) continue;
+    }
+    const double total = choices.back().sum;
     const auto chosen = std::min(
-        std::upper_bound(choices.begin(), choices.end(), wanted,
+        std::upper_bound(choices.begin(), choices.end(), unit * total,
                          [](double value, const Choice& choice) { return value < choice.sum; }),
         choices.end() - 1);
+    // Choose a place on it
     const Emitter& emitter = emitters_[chosen->emitter];
     View view;
     if (!look_at(emitter, position, view)) continue;

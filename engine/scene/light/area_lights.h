@@ -7,6 +7,7 @@
 #include <glm/vec3.hpp>
 
 #include "engine/base/low_discrepancy.h"
+#include "engine/scene/light/emitter_tree.h"
 #include "engine/scene/light/emitters.h"
 
 namespace ptc {
@@ -21,9 +22,8 @@ struct EmitterSample {
 /// Chooses shadow ray targets on emissive triangles.
 ///
 /// Emitters are chosen in proportion to what each may give to the point: its brightness times its
-/// solid angle times the cosine there. When there are at most 64 emitters, all of them are
-/// candidates. Of more, 64 candidates are drawn by power for each point (resampled importance
-/// sampling: Talbot, Cline and Egbert 2005).
+/// solid angle times the cosine there. When there are at most 64 emitters, they are chosen from
+/// all. Of more, each sample draws a few neighbours by a tree, and chooses from these.
 class AreaLights {
  public:
   explicit AreaLights(std::vector<Emitter> emitters);
@@ -47,32 +47,21 @@ class AreaLights {
   struct Choice {
     std::uint32_t emitter = 0;
     double expected = 0;  ///< what the emitter may give to the point, in brightness
-    double sum = 0;       ///< sum of the weights of the candidates up to and including this
+    double sum = 0;       ///< of the weights of the candidates up to and including this
   };
-  /// Makes every emitter that may give light to the point a candidate.
-  void choose_all(const glm::vec3& position, const glm::vec3& normal,
-                  std::vector<Choice>& out) const;
-  /// Draws the candidates by power, and keeps those that may give light to the point.
-  void choose_by_power(const glm::vec3& position, const glm::vec3& normal, std::uint64_t seed,
-                       std::vector<Choice>& out) const;
-  /// Returns the emitter that a number in [0, 1) picks in proportion to power.
-  [[nodiscard]] std::uint32_t draw(double unit) const;
+  /// Makes those of a range of emitters candidates that may give light to the point.
+  /// @param weight  of what each may give
+  void choose_from(std::uint32_t first, std::uint32_t end, double weight, const glm::vec3& position,
+                   const glm::vec3& normal, std::vector<Choice>& out) const;
+  /// Draws candidates by the tree.
+  /// @param first  number of the first of the points on a line by which they are drawn
+  /// @return       number in [0, 1) that the draws leave
+  double choose_by_tree(const glm::vec3& position, const glm::vec3& normal,
+                        const SquarePoints& points, std::uint32_t first, unsigned draws,
+                        std::vector<Choice>& out) const;
 
   std::vector<Emitter> emitters_;
-  /// A column of Walker's alias table: it keeps its own emitter up to `keep`, and gives the rest to
-  /// another.
-  ///
-  ///     1 +-----+-----+-----+
-  ///       |  2  |  2  |     |     Three emitters of powers 0.4, 0.6 and 2 times the mean: each
-  ///       |.....|.....|  2  |     column has the height 1, and columns 0 and 1 are filled up with
-  ///       |  0  |  1  |     |     what emitter 2 has in excess.
-  ///     0 +-----+-----+-----+
-  struct Column {
-    float keep = 1;           ///< share of the column's own emitter, in (0, 1]
-    std::uint32_t other = 0;  ///< the emitter that has the rest
-  };
-  std::vector<Column> table_;  ///< a column for each emitter
-  std::vector<float> share_;   ///< share of the total power, for each emitter
+  EmitterTree tree_;  ///< of more than 64 emitters
 };
 
 }  // namespace ptc

@@ -3,9 +3,11 @@
 
 #include <vector>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include "engine/io/mesh/mesh.h"
+#include "engine/scene/light/lights.h"
 
 namespace ptc {
 
@@ -15,6 +17,17 @@ struct Emitter {
   glm::vec3 corner[3];    ///< counter-clockwise as seen from the emitting side
   glm::vec3 radiance{0};  ///< W/(m^2 sr)
 };
+
+/// Returns the normal of an emitter, as long as twice its area.
+[[nodiscard]] inline glm::dvec3 twice_area_of(const Emitter& emitter) noexcept {
+  const glm::dvec3 a(emitter.corner[0]);
+  return glm::cross(glm::dvec3(emitter.corner[1]) - a, glm::dvec3(emitter.corner[2]) - a);
+}
+
+/// Returns the power of an emitter, up to a factor that all share.
+[[nodiscard]] inline double power_of(const Emitter& emitter) noexcept {
+  return glm::length(twice_area_of(emitter)) * brightness(emitter.radiance);
+}
 
 /// Returns the emissive triangles of a mesh. A triangle whose emission has a texture is cut where
 /// that varies, until each piece has about one radiance, which is the mean of the texture there.

@@ -28,7 +28,7 @@ struct LightRay {
 };
 
 /// Draws rays to all lights of a rig but its sky, and to emitters.
-/// Memory: 60 bytes for each emitter.   Threads: const members may be called concurrently.
+/// Memory: 76 bytes for each emitter.   Threads: const members may be called concurrently.
 class LightRays {
  public:
   /// @param rig       normalised()
@@ -43,7 +43,7 @@ class LightRays {
   /// @param normal    unit
   /// @param seed      fixes the sample points; each kind of light takes its own of them
   /// @param turn      number of this point among those that share the seed, whose samples are
-  ///                  spread together; choices among more than 64 emitters are the same
+  ///                  spread together
   /// @param out       is overwritten; lights behind the surface have no rays
   void draw(const glm::dvec3& position, const glm::vec3& normal, const LightSampling& sampling,
             std::uint64_t seed, std::uint32_t turn, std::vector<LightRay>& out) const;

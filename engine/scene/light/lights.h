@@ -1,6 +1,7 @@
 // Lights, and their JSON record.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -16,6 +17,12 @@
 #include "engine/io/mesh/mesh.h"
 
 namespace ptc {
+
+/// Returns the sum of the channels of a colour; what is negative or not finite counts as black.
+[[nodiscard]] inline double brightness(const glm::vec3& c) noexcept {
+  const double sum = static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
+  return sum > 0 && std::isfinite(sum) ? sum : 0;
+}
 
 /// A disc of light infinitely far away.
 struct Sun {

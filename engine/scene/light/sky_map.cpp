@@ -39,12 +39,6 @@ bool has_map(const Sky& sky) {
   return sky.map && sky.map->size() > 0;
 }
 
-// Returns the sum of the channels; what is negative or not finite counts as black.
-double brightness(const glm::vec3& c) {
-  const double sum = static_cast<double>(c.x) + static_cast<double>(c.y) + static_cast<double>(c.z);
-  return sum > 0 && std::isfinite(sum) ? sum : 0;
-}
-
 // Turns a uniform number into an offset from a pixel's centre, in pixels. Its density is the weight
 // that bilinear interpolation gives to the pixel: it falls from 1 at the centre to 0 at the
 // neighbours' centres.

@@ -22,16 +22,16 @@ constexpr double kLeastDetail = 0.05;
 constexpr double kMostDetail = 1;
 
 /// A stretch of surface, and how much less than the even spacing it asks for.
-struct Stretch {
+struct WishedStretch {
   const SurfaceDetail* detail;
   double wish;  ///< a spacing over the even one
 };
 
 /// Returns the factor on all wishes that makes as many surfels as the even spacing does.
-double even_out(const std::vector<Stretch>& stretches) {
+double even_out(const std::vector<WishedStretch>& stretches) {
   const auto surfels = [&](double factor) {  // over those of the even spacing
     double sum = 0, area = 0;
-    for (const Stretch& at : stretches) {
+    for (const WishedStretch& at : stretches) {
       const double spacing = std::clamp(factor * at.wish, kFinest, kWidest);
       sum += at.detail->area / (spacing * spacing);
       area += at.detail->area;
@@ -70,7 +70,7 @@ std::optional<SpacingMap> adapted_spacing(const PatchSampler& sampler, const Ray
   if (!(area > 0)) return std::nullopt;
 
   // Weigh what was seen
-  std::vector<Stretch> stretches;
+  std::vector<WishedStretch> stretches;
   for (const auto& patch : found) {
     for (const SurfaceDetail& detail : patch) {
       const double contrast = light > 0 ? detail.contrast * area / light : 0;
@@ -80,7 +80,7 @@ std::optional<SpacingMap> adapted_spacing(const PatchSampler& sampler, const Ray
   }
   const double factor = even_out(stretches);
   std::vector<SpacingMap::Wish> wishes;
-  for (const Stretch& at : stretches) {
+  for (const WishedStretch& at : stretches) {
     const double wanted = spacing * std::clamp(factor * at.wish, kFinest, kWidest);
     for (const glm::dvec3& place : at.detail->places) wishes.push_back({place, wanted});
   }

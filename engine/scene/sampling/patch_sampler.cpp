@@ -314,8 +314,9 @@ std::vector<Surfel> PatchSampler::sample(const SurfacePatch& patch) const {
     if (front) {
       surfel.radius = radius * std::sqrt(1 + difference);
       surfel.position = middle + apart;
-      surfel.emission =
-          finite_or_black(glm::vec3(group.emission / static_cast<double>(group.members.size())));
+      // What the cell emits, from the area that its front has
+      const double shares = static_cast<double>(group.members.size()) * (1 + double{difference});
+      surfel.emission = finite_or_black(glm::vec3(group.emission / shares));
       surfel.radiance = *front;
       surfels.push_back(surfel);
     }
