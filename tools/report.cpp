@@ -258,6 +258,7 @@ ordered_json facts_of(const LightingReport& report) {
                      {"shade_cpu_seconds", report.shade_cpu_seconds},
                      {"bounce_cpu_seconds", report.bounce_cpu_seconds},
                      {"glossy_cpu_seconds", report.glossy_cpu_seconds},
+                     {"lamp_cpu_seconds", report.lamp_cpu_seconds},
                      {"settings", facts_of(report.settings)},
                      {"gather", facts_of(report.gather)},
                      {"cache", facts_of(report.cache)}};

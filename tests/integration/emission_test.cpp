@@ -1,19 +1,28 @@
 // Scenes with points that emit light, through every step that writes a container.
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <fstream>
+#include <numbers>
 #include <tuple>
 
 #include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
 
+#include "engine/io/image/image.h"
 #include "engine/pipeline/convert/convert.h"
 #include "engine/ptc.h"
+#include "engine/shade/lift.h"
 #include "engine/verify/salvage.h"
 #include "engine/verify/verify.h"
 #include "format/point_page.h"
+#include "tests/support/channels.h"
 #include "tests/support/scenes.h"
+#include "tools/bench/shapes/meshes.h"
 
 using namespace ptc;
 using namespace ptc::test;
+using ptc::bench::add_quad;
 
 namespace {
 
@@ -194,4 +203,211 @@ TEST_CASE("emission: salvaged points keep it", "[integration][emission]") {
   CHECK(report.points == light.size());
   CHECK(report.flux_share == Approx(0.97).margin(0.02));
   check_sound(dir / "kept.ptcx");
+}
+
+namespace {
+
+/// A square lamp that looks down.
+struct SquareLamp {
+  double side, height;
+};
+
+/// Returns the irradiance that a lamp of radiance kLamp brings to a place on a floor at y = 0 where
+/// nothing is between, W/m^2. Source: Lambert 1760, the irradiance of a polygon.
+double lamp_irradiance(const SquareLamp& lamp, const glm::dvec3& place) {
+  const double h = 0.5 * lamp.side;
+  std::array<glm::dvec3, 4> way{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec3 corner(i == 1 || i == 2 ? h : -h, lamp.height, i >= 2 ? h : -h);
+    way[i] = glm::normalize(corner - place);
+  }
+  double sum = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec3 across = glm::cross(way[i], way[(i + 1) % 4]);
+    sum += std::atan2(glm::length(across), glm::dot(way[i], way[(i + 1) % 4])) * across.y /
+           glm::length(across);
+  }
+  return 0.5 * std::abs(sum) * double{kLamp.r};
+}
+
+/// A room of 4 x 2.5 x 4 with a lamp, or without it.
+Mesh lamp_room(const SquareLamp& lamp, bool has_lamp, float albedo) {
+  Mesh mesh;
+  mesh.materials = {
+      {.name = "wall", .albedo = glm::vec3(albedo)},
+      {.name = "lamp", .albedo = glm::vec3(0), .emission = kLamp, .double_sided = true}};
+  const auto h = static_cast<float>(0.5 * lamp.side), y = static_cast<float>(lamp.height);
+  add_quad(mesh, {-2, 0, -2}, {0, 0, 4}, {4, 0, 0}, 0);
+  add_quad(mesh, {-2, 2.5F, -2}, {4, 0, 0}, {0, 0, 4}, 0);
+  add_quad(mesh, {-2, 0, -2}, {4, 0, 0}, {0, 2.5F, 0}, 0);
+  add_quad(mesh, {-2, 0, 2}, {0, 2.5F, 0}, {4, 0, 0}, 0);
+  add_quad(mesh, {-2, 0, -2}, {0, 2.5F, 0}, {0, 0, 4}, 0);
+  add_quad(mesh, {2, 0, -2}, {0, 0, 4}, {0, 2.5F, 0}, 0);
+  if (has_lamp) add_quad(mesh, {-h, y, -h}, {2 * h, 0, 0}, {0, 0, 2 * h}, 1);
+  return mesh;
+}
+
+/// Builds such a room.
+/// @param area_rays  0: its lamp lights nothing while it is built
+void build_room(const Mesh& mesh, unsigned area_rays, const LightRig& rig,
+                const std::filesystem::path& target) {
+  BuildRequest build{.mesh = std::make_shared<const Mesh>(mesh), .lights = rig};
+  build.sampling.count = 60'000;
+  build.sampling.lights.area_rays = area_rays;
+  Progress silent;
+  build_container(build, target, silent);
+}
+
+/// The differences of values from what they should be.
+struct Differences {
+  double sum = 0, wanted = 0, square = 0, wanted_square = 0;
+
+  void add(double value, double should) {
+    sum += value;
+    wanted += should;
+    square += (value - should) * (value - should);
+    wanted_square += should * should;
+  }
+  [[nodiscard]] double mean() const { return sum / wanted; }
+  [[nodiscard]] double rms() const { return std::sqrt(square / wanted_square); }
+};
+
+}  // namespace
+
+TEST_CASE("emission: lamps light the receivers of a file by rays", "[integration][emission]") {
+  // Black walls: what arrives is the light of the lamp, for which there is a formula
+  const TemporaryDirectory dir;
+  Progress silent;
+  {
+    std::ofstream file(dir / "floor.xyz");
+    for (int i = 0; i < 1600; ++i)
+      file << -1.8 + 3.6 / 39 * (i / 40) << " 0 " << -1.8 + 3.6 / 39 * (i % 40) << " 0 1 0\n";
+  }
+  for (const SquareLamp& lamp :
+       {SquareLamp{0.5, 2.48}, SquareLamp{0.1, 0.2}, SquareLamp{1, 2.4}, SquareLamp{3.9, 2.45}}) {
+    INFO("a lamp of " << lamp.side << " at " << lamp.height);
+    build_room(lamp_room(lamp, true, 0), 16, {}, dir / "a.ptcx");
+    ShadeRequest shade{{.scene = dir / "a.ptcx"}};
+    shade.receivers = dir / "floor.xyz";
+    const LightingReport report = shade_container(shade, dir / "lit.ptcx", silent);
+    CHECK(report.lamp_cpu_seconds > 0);
+    const Frame frame = ContainerReader(dir / "lit.ptcx").header().frame;
+    const std::vector<Surfel> floor = points_of(dir / "lit.ptcx");
+    const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
+    REQUIRE(light.size() == 1600);
+    Differences found;
+    for (std::size_t i = 0; i < floor.size(); ++i)
+      found.add(light[i].r, lamp_irradiance(lamp, lifted(floor[i], 0.15F, frame).position));
+    CHECK(found.mean() == Approx(1).epsilon(0.01));
+    CHECK(found.rms() < 0.05);
+  }
+}
+
+TEST_CASE("emission: suns and spots of the scene light the receivers of a file",
+          "[integration][emission]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  std::ofstream(dir / "floor.xyz") << "0 0.001 0 0 1 0\n1.5 0.001 0 0 1 0\n1.5 0.001 1 0 1 0\n";
+  LightRig rig{.suns = {{{0, 1, 0}, glm::vec3(2), 0}}};
+  rig.points.push_back({.position = {1.5, 0.5, 0}, .intensity = glm::vec3(0.25F)});
+  BuildRequest build{.mesh = std::make_shared<const Mesh>(lit_floor()), .lights = rig};
+  build.sampling.count = 20'000;
+  build_container(build, dir / "a.ptcx", silent);
+  ShadeRequest shade{{.scene = dir / "a.ptcx"}};
+  shade.receivers = dir / "floor.xyz";
+  shade_container(shade, dir / "lit.ptcx", silent);
+  const Frame frame = ContainerReader(dir / "lit.ptcx").header().frame;
+  const std::vector<Surfel> floor = points_of(dir / "lit.ptcx");
+  const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
+  for (std::size_t i = 0; i < floor.size(); ++i) {
+    const glm::dvec3 at = lifted(floor[i], 0.15F, frame).position;
+    const glm::dvec3 way = glm::dvec3(1.5, 0.5, 0) - at;
+    const double lamp = 0.25 * way.y / std::pow(glm::length(way), 3),
+                 sun = std::abs(at.x) < 0.5 ? 0 : 2;  // the lamp of 1 x 1 hides it
+    CHECK(light[i].r == Approx(lamp + sun + lamp_irradiance({1, 2}, at)).epsilon(0.03));
+  }
+  // Its own points have that light in what they reflect
+  shade.receivers.clear();
+  shade_container(shade, dir / "own.ptcx", silent);
+  const std::vector<Surfel> own = points_of(dir / "own.ptcx");
+  const std::vector<glm::vec3> gathered = values_of(dir / "own.ptcx").at("irradiance");
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (own[i].position.y < 1) REQUIRE(gathered[i].r < 0.01F);
+  }
+}
+
+TEST_CASE("emission: rays light points that no emitter has lit, in every bounce",
+          "[integration][emission]") {
+  // As many bounces of light as where the lamp lit the points, and the one by which it does
+  const TemporaryDirectory dir;
+  Progress silent;
+  const SquareLamp lamp{0.5, 2.4};
+  const Mesh room = lamp_room(lamp, true, 0.6F);
+  build_room(room, 16, {}, dir / "lit.ptcx");
+  build_room(room, 0, {}, dir / "dark.ptcx");
+  const auto shaded = [&](const char* scene, unsigned bounces) {
+    ShadeRequest shade{{.scene = dir / scene, .bounces = bounces}};
+    shade_container(shade, dir / "shaded.ptcx", silent);
+    std::pair<std::vector<Surfel>, std::vector<glm::vec3>> result(
+        points_of(dir / "shaded.ptcx"), values_of(dir / "shaded.ptcx").at("irradiance"));
+    return result;
+  };
+  const auto [lit, indirect] = shaded("lit.ptcx", 2);
+  const auto [dark, light] = shaded("dark.ptcx", 3);
+  REQUIRE(lit.size() == dark.size());
+  Differences found;
+  for (std::size_t i = 0; i < lit.size(); ++i) {
+    REQUIRE(lit[i].position == dark[i].position);
+    if (lit[i].position.y > 0.1) continue;
+    REQUIRE(dark[i].radiance.r == 0);
+    found.add(double{light[i].r},
+              double{indirect[i].r} + double{lit[i].radiance.r} * std::numbers::pi / 0.6);
+  }
+  CHECK(found.mean() == Approx(1).epsilon(0.01));
+  CHECK(found.rms() < 0.05);
+}
+
+TEST_CASE("emission: a picture of a mesh without the lamp has its light all the same",
+          "[integration][emission][render]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  const SquareLamp lamp{0.5, 2.48};
+  build_room(lamp_room(lamp, true, 0.6F), 16, {}, dir / "a.ptcx");
+  const auto picture = [&](bool has_lamp, bool own_mesh) {
+    RenderRequest request{{.scene = dir / "a.ptcx", .bounces = 2}};
+    if (own_mesh) request.mesh = std::make_shared<const Mesh>(lamp_room(lamp, has_lamp, 0.6F));
+    request.camera = Camera{.position = {0, 2, 0.001},
+                            .look_at = {0, 0, 0},
+                            .vertical_fov = 1.2F,
+                            .width = 64,
+                            .height = 64};
+    render_picture(request, std::array{PictureTarget{dir / "a.exr"}}, silent);
+    return read_image(dir / "a.exr");
+  };
+  const Image whole = picture(true, true), without = picture(false, true);
+  Differences found;
+  for (unsigned y = 0; y < 64; ++y) {
+    for (unsigned x = 0; x < 64; ++x) found.add(without.at(x, y).r, whole.at(x, y).r);
+  }
+  CHECK(found.mean() == Approx(1).epsilon(0.01));
+  CHECK(found.rms() < 0.05);
+}
+
+TEST_CASE("emission: where most of a scene emits, the gather brings that light",
+          "[integration][emission]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  std::vector<Surfel> surfels;
+  add_sphere(surfels, glm::dvec3(0), 1, 0.05, glm::vec3(0));
+  for (Surfel& s : surfels) {
+    s.normal = -s.normal;
+    s.emission = glm::vec3(1);
+  }
+  write_scene(dir / "a.ptcx", surfels);
+  const ShadeRequest shade{{.scene = dir / "a.ptcx"}};
+  const LightingReport report = shade_container(shade, dir / "lit.ptcx", silent);
+  CHECK(report.lamp_cpu_seconds == 0);
+  const std::vector<glm::vec3> irradiance = values_of(dir / "lit.ptcx").at("irradiance");
+  for (const glm::vec3& light : irradiance)
+    REQUIRE(light.r == Approx(std::numbers::pi).epsilon(0.03));
 }

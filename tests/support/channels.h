@@ -19,8 +19,8 @@
 
 namespace ptc::test {
 
-/// Values of the channels of halves of a container, by name, with the points' own light and albedo.
-/// A channel of one component has it in x.
+/// Values of the channels of up to three halves of a container, by name, with the points' own light
+/// and albedo. A channel of one component has it in x.
 inline std::map<std::string, std::vector<glm::vec3>> values_of(const std::filesystem::path& path) {
   std::map<std::string, std::vector<glm::vec3>> values;
   const ContainerReader container(path);
@@ -33,6 +33,10 @@ inline std::map<std::string, std::vector<glm::vec3>> values_of(const std::filesy
       values["albedo"].push_back(surfels[i].albedo);
       for (const Channel& channel : source.channels()) {
         glm::vec3 v(0);
+        if (channel.type != ChannelType::half || channel.components > 3) {
+          value += channel.component_bytes() * channel.components;
+          continue;
+        }
         for (int k = 0; k < channel.components; ++k, value += 2) {
           std::uint16_t half = 0;
           std::copy_n(value, 2, reinterpret_cast<std::byte*>(&half));

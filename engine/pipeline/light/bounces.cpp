@@ -36,25 +36,30 @@ GatherOptions coarser(const GatherOptions& gather) {
 /// plus what a shader finds.
 class BouncedPoints : public RelitPoints {
  public:
-  BouncedPoints(const ContainerReader& first, const PointRange& range, Shader& shader, float lift,
-                Progress& progress)
+  /// @param emitters  as BounceOptions::emitters
+  BouncedPoints(const ContainerReader& first, const PointRange& range, Shader& shader,
+                ReceiverLight* emitters, float lift, Progress& progress)
       : RelitPoints(first, range, progress),
         frame_(first.header().frame),
         shader_(shader),
+        emitters_(emitters),
         lift_(lift),
         receivers_(kBatch),
-        results_(kBatch) {}
+        results_(kBatch),
+        arrives_(kBatch) {}
 
   [[nodiscard]] double cpu_seconds() const { return cpu_; }
 
  private:
-  void relight(std::span<PointRecord> records, std::uint64_t /*first*/) override {
+  void relight(std::span<PointRecord> records, std::uint64_t first) override {
+    const auto receivers = std::span(receivers_).first(records.size());
     for (std::size_t i = 0; i < records.size(); ++i)
       receivers_[i] = lifted(to_surfel(records[i], frame_), lift_, frame_);
     const double before = ptc::cpu_seconds();
     Progress silent;
-    shader_.shade(std::span(receivers_).first(records.size()),
-                  std::span(results_).first(records.size()), silent);
+    shader_.shade(receivers, std::span(results_).first(records.size()), silent);
+    if (emitters_)
+      emitters_->irradiance(0, receivers, first, std::span(arrives_).first(records.size()));
     cpu_ += ptc::cpu_seconds() - before;
 
     // Add the light that they reflect
@@ -63,8 +68,9 @@ class BouncedPoints : public RelitPoints {
       for (std::size_t c = 0; c < 3; ++c) {
         const float reflects =
             static_cast<float>(record.albedo[c]) * (std::numbers::inv_pi_v<float> / 255);
+        const auto channel = static_cast<int>(c);
         const float bounced =
-            reflects * std::max(0.0F, results_[i].irradiance[static_cast<int>(c)]);
+            reflects * (std::max(0.0F, results_[i].irradiance[channel]) + arrives_[i][channel]);
         record.radiance[c] = encode_half(decode_half(record.radiance[c]) + bounced);
       }
     }
@@ -72,20 +78,22 @@ class BouncedPoints : public RelitPoints {
 
   Frame frame_;
   Shader& shader_;
+  ReceiverLight* emitters_;
   float lift_;
   std::vector<Receiver> receivers_;
   std::vector<Shading> results_;
+  std::vector<glm::vec3> arrives_;
   double cpu_ = 0;
 };
 
 /// Returns the settings with which the points of a scene are shaded: more coarsely than the
-/// receivers, and by the light of surfaces alone: that of emitters which lit the points is in their
-/// radiance.
-ShadeOptions bounce_options(const ContainerReader& scene, const ShadeOptions& of_receivers) {
-  ShadeOptions shade = of_receivers;
+/// receivers, and by the light of surfaces alone: that of emitters is in the radiance of points
+/// which they lit, or rays bring it.
+ShadeOptions bounce_options(const ContainerReader& scene, const BounceOptions& options) {
+  ShadeOptions shade = options.shade;
   shade.sky = {};
   shade.gather = coarser(shade.gather);
-  shade.gather.emission = !lit_by_emitters(scene);
+  shade.gather.emission = !lit_by_emitters(scene) && options.emitters == nullptr;
   shade.variants = 1;
   return shade;
 }
@@ -95,8 +103,9 @@ void write_bounce(const ContainerReader& scene, const ContainerReader& lit,
                   const BounceOptions& options, std::optional<std::size_t> part,
                   const std::filesystem::path& target, const Executor& executor,
                   LightingReport& report, Progress& progress) {
-  Shader shader(lit, bounce_options(scene, options.shade), executor);
-  BouncedPoints points(scene, points_of(scene, part), shader, options.lift, progress);
+  Shader shader(lit, bounce_options(scene, options), executor);
+  BouncedPoints points(scene, points_of(scene, part), shader, options.emitters, options.lift,
+                       progress);
   ContainerWriter writer(target, {.page_shift = scene.header().page_shift,
                                   .uuid = part ? scene.parts()[*part]->header().uuid : Uuid{},
                                   .frame = scene.header().frame,

@@ -11,6 +11,7 @@
 
 #include "engine/base/memory_budget.h"
 #include "engine/pipeline/light/lighting.h"
+#include "engine/pipeline/light/receiver_light.h"
 #include "engine/shade/shader.h"
 #include "engine/store/reader.h"
 
@@ -22,7 +23,10 @@ struct BounceOptions {
   /// Settings for the receivers of the run. The points of the scene are shaded more coarsely, and
   /// without the sky.
   ShadeOptions shade;
-  float lift = 0.15F;              ///< height of a point above its surfel, in radii of the surfel
+  float lift = 0.15F;  ///< height of a point above its surfel, in radii of the surfel
+  /// Brings the light of emitters to the points, as its first set of lights. Null: the emitters of
+  /// the scene have lit them, or they gather what surfaces emit.
+  ReceiverLight* emitters = nullptr;
   std::filesystem::path temp_dir;  ///< directory of the temporary containers
 };
 

@@ -14,14 +14,14 @@
 namespace ptc {
 namespace {
 
-constexpr unsigned kPlaces = 4;           // of a surfel that are lit
+constexpr float kLeastLift = 0.15F;       // of emitters, where rays end
 constexpr std::size_t kNeighbours = 64;   // surfels whose rays are traced together
 constexpr std::size_t kRays = 8192;       // that are traced at the latest when there are so many
 constexpr float kQuarter = 0.353553391F;  // of the edge of the square that a disc of radius 1 has
 
-/// Returns a share of the rays of a surfel, rounded up.
-unsigned share(unsigned rays) {
-  return (rays + kPlaces - 1) / kPlaces;
+/// Returns the rays of each place of a surfel, rounded up.
+unsigned share(unsigned rays, unsigned places) {
+  return (rays + places - 1) / places;
 }
 
 /// Returns the place of a quarter of a surfel's cell, relative to its centre, scene units.
@@ -73,20 +73,25 @@ struct DiscLight::Worker {
 };
 
 DiscLight::DiscLight(const SceneView& view, PageCache& cache, const LightRays& rays,
-                     const LightSampling& sampling, Sides sides, const Executor& executor)
+                     const LightSampling& sampling, unsigned places, Sides sides,
+                     const Executor& executor)
     : view_(view),
       cache_(cache),
       rays_(rays),
-      sampling_{.sun_rays = share(sampling.sun_rays), .area_rays = share(sampling.area_rays)},
+      places_(places),
+      sampling_{.sun_rays = share(sampling.sun_rays, places),
+                .area_rays = share(sampling.area_rays, places)},
       sides_(sides),
       executor_(executor),
       workers_(executor.threads()) {}
 
 DiscLight::~DiscLight() = default;
 
-std::uint64_t DiscLight::thread_bytes(const LightRig& rig, const LightSampling& sampling) noexcept {
-  const std::uint64_t place = rig.suns.size() * std::uint64_t{share(sampling.sun_rays)} +
-                              rig.points.size() + rig.spots.size() + share(sampling.area_rays);
+std::uint64_t DiscLight::thread_bytes(const LightRig& rig, const LightSampling& sampling,
+                                      unsigned places) noexcept {
+  const std::uint64_t place = rig.suns.size() * std::uint64_t{share(sampling.sun_rays, places)} +
+                              rig.points.size() + rig.spots.size() +
+                              share(sampling.area_rays, places);
   // A ray takes a LightRay, and some 60 bytes until it is traced. Vectors that grow take twice as
   // much
   return ShadowTracer::kBytes + 2 * (kRays + place) * (sizeof(LightRay) + 64);
@@ -116,8 +121,9 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
       if (!open.empty()) open[i] = glm::vec3(0);
       if (!(surfel.radius > 0)) continue;
       const Basis basis(surfel.normal);
-      for (unsigned place = 0; place < kPlaces; ++place) {
-        const glm::dvec3 position = surfel.position + glm::dvec3(quarter(surfel, basis, place));
+      for (unsigned place = 0; place < places_; ++place) {
+        const glm::vec3 aside = places_ == 1 ? glm::vec3(0) : quarter(surfel, basis, place);
+        const glm::dvec3 position = surfel.position + glm::dvec3(aside);
         const glm::dvec3 start = position + glm::dvec3(surfel.normal * heights[i]);
         const glm::vec3 origin = scale.way(middle, start);
         rays_.draw(position, surfel.normal, sampling_, first + i, place, own.drawn);
@@ -131,7 +137,7 @@ void DiscLight::light_block(Worker& own, std::span<const Surfel> surfels,
             shadow.length = static_cast<float>(std::min(scale.length(distance), 0x1p100));
           }
           own.rays.push_back(shadow);
-          own.brings.push_back(ray.irradiance / static_cast<float>(kPlaces));
+          own.brings.push_back(ray.irradiance / static_cast<float>(places_));
           own.surfels.push_back(static_cast<std::uint32_t>(i));
         }
         if (own.rays.size() >= kRays) own.bring(out, open);
@@ -154,21 +160,25 @@ void DiscLight::irradiance(std::span<const Surfel> surfels, std::span<const floa
   });
 }
 
-std::uint64_t count_emitting(const ContainerReader& container) {
-  std::uint64_t count = 0;
-  for_each_emitting(container, [&](const PointRecord&) { ++count; });
-  return count;
+Emitting count_emitting(const ContainerReader& container) {
+  Emitting emitting;
+  for_each_emitting(container, [&](const PointRecord& point) {
+    ++emitting.count;
+    emitting.area += 2 * double{point.radius} * double{point.radius};
+  });
+  return emitting;
 }
 
 std::vector<Emitter> emitting_surfels(const ContainerReader& container, const glm::dvec3& origin,
                                       float lift, std::uint64_t count) {
   std::vector<Emitter> emitters;
+  if (count == 0) return emitters;
   emitters.reserve(2 * count);
   const Frame& frame = container.header().frame;
   for_each_emitting(container, [&](const PointRecord& point) {
     const Surfel surfel = to_surfel(point, frame);
     const Basis basis(surfel.normal);
-    const glm::vec3 centre(lifted(surfel, lift, frame).position - origin);
+    const glm::vec3 centre(lifted(surfel, std::max(lift, kLeastLift), frame).position - origin);
     // The corners of its cell lie on the rim of the disc
     const glm::vec3 a = basis.x * surfel.radius, b = basis.y * surfel.radius;
     emitters.push_back({{centre + a, centre + b, centre - a}, surfel.emission});

@@ -30,21 +30,26 @@ namespace ptc {
 ///     | o | o |
 ///     +-------+
 ///
-/// Results depend on the surfels, their numbers and the rays alone.
+/// A receiver has one place, where it is. Results depend on the surfels, their numbers and the rays
+/// alone.
 /// Memory: thread_bytes() for each thread.
 class DiscLight {
  public:
+  /// Places of a surfel's cell that are lit.
+  static constexpr unsigned kCellPlaces = 4;
   /// Surfels that one thread lights together, at least.
   static constexpr std::size_t kBlock = 4096;
   /// Returns the bytes of memory for each thread.
   [[nodiscard]] static std::uint64_t thread_bytes(const LightRig& rig,
-                                                  const LightSampling& sampling) noexcept;
+                                                  const LightSampling& sampling,
+                                                  unsigned places) noexcept;
 
   /// @param view, cache  must outlive this; of the same container
   /// @param rays         must outlive this
   /// @param sampling     rays of each surfel; sky_rays is not used
+  /// @param places       of a surfel that are lit: kCellPlaces, or 1 for receivers
   DiscLight(const SceneView& view, PageCache& cache, const LightRays& rays,
-            const LightSampling& sampling, Sides sides, const Executor& executor);
+            const LightSampling& sampling, unsigned places, Sides sides, const Executor& executor);
   ~DiscLight();
 
   /// Returns the irradiance of surfels, W/m^2.
@@ -69,21 +74,30 @@ class DiscLight {
   const SceneView& view_;
   PageCache& cache_;
   const LightRays& rays_;
+  unsigned places_;
   LightSampling sampling_;  ///< of each place
   Sides sides_;
   const Executor& executor_;
   std::vector<std::unique_ptr<Worker>> workers_;  ///< by thread, made when first needed
 };
 
-/// Returns the number of surfels of a container that emit.
+/// Memory of an emitting triangle: as it is collected, and in LightRays.
+inline constexpr std::uint64_t kEmitterBytes = 160;
+
+/// The surfels of a container that emit.
+struct Emitting {
+  std::uint64_t count = 0;  ///< number of surfels
+  double area = 0;          ///< of them, scene units squared
+};
+/// Counts the surfels of a container that emit.
 /// @throws FormatError when a page is damaged; std::system_error
-[[nodiscard]] std::uint64_t count_emitting(const ContainerReader& container);
+[[nodiscard]] Emitting count_emitting(const ContainerReader& container);
 
 /// Returns the emitting surfels of a container as triangles: two for the square cell of each, at
-/// the height of a receiver, so that rays which end there do not meet the surfel itself.
+/// the height of a receiver or above, so that rays which end there do not meet the surfel itself.
 /// @param origin  to which they are relative, scene units
-/// @param lift    height over the radius of a surfel
-/// @param count   count_emitting()
+/// @param lift    height over the radius of a surfel, for receivers; less than usual is not taken
+/// @param count   Emitting::count
 /// @throws FormatError when a page is damaged; std::system_error
 /// Memory: 48 bytes for each triangle.
 [[nodiscard]] std::vector<Emitter> emitting_surfels(const ContainerReader& container,

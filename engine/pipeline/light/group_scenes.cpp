@@ -53,6 +53,7 @@ void add_costs(LightingReport& report, const LightingReport& group) {
   report.shade_cpu_seconds += group.shade_cpu_seconds;
   report.bounce_cpu_seconds += group.bounce_cpu_seconds;
   report.glossy_cpu_seconds += group.glossy_cpu_seconds;
+  report.lamp_cpu_seconds += group.lamp_cpu_seconds;
   report.gather.add(group.gather);
   report.cache = group.cache;
   for (const auto& [stage, seconds] : group.seconds) {

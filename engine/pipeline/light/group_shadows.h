@@ -2,18 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "engine/base/executor.h"
-#include "engine/base/memory_budget.h"
-#include "engine/cache/page_cache.h"
-#include "engine/pipeline/light/disc_light.h"
+#include "engine/pipeline/light/receiver_light.h"
 #include "engine/scene/light/direct_light.h"
-#include "engine/shade/gather/scene_view.h"
 #include "engine/shade/shading.h"
 
 namespace ptc {
@@ -46,13 +42,9 @@ class DiscShadows {
   std::span<const float> at(std::span<const Receiver> receivers);
 
  private:
-  SceneView view_;
-  PageCache cache_;
-  std::deque<LightRays> rays_;    ///< for each group
-  std::deque<DiscLight> lights_;  ///< for each group
-  std::uint64_t done_ = 0;        ///< receivers so far
-  std::vector<Surfel> surfels_;
-  std::vector<float> heights_, shadows_;
+  ReceiverLight light_;     ///< a set of lights for each group
+  std::uint64_t done_ = 0;  ///< receivers so far
+  std::vector<float> shadows_;
   std::vector<glm::vec3> arrives_, open_;
 };
 

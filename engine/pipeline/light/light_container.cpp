@@ -214,7 +214,7 @@ LightReport light_points(const LightRequest& request, std::optional<std::size_t>
         "the channels of an earlier shading are left out, because they are of other light");
 
   const std::uint64_t emitting =
-      request.emission && request.light_sampling.area_rays > 0 ? count_emitting(scene) : 0;
+      request.emission && request.light_sampling.area_rays > 0 ? count_emitting(scene).count : 0;
   report.emitters = 2 * emitting;
   if (!request.lights && emitting == 0 && light_groups(rig, false).empty()) {
     throw RequestError("lights", scene.path().string() +
@@ -233,7 +233,7 @@ LightReport light_points(const LightRequest& request, std::optional<std::size_t>
   };
   const auto cache_bytes_with = [&](unsigned threads) {
     MemoryBudget budget = budget_of(request.run.memory_bytes, "lighting");
-    budget.charge("emitters", 160 * report.emitters);
+    budget.charge("emitters", kEmitterBytes * report.emitters);
     charge_sky(budget, rig.sky);
     if (rig.sky.map) budget.charge("the sky as it is gathered", smooth_sky_bytes());
     budget.charge(
@@ -241,7 +241,8 @@ LightReport light_points(const LightRequest& request, std::optional<std::size_t>
         ContainerWriter::memory_bytes(from.page_count(), scene.header().page_shift, threads) +
             held_pages_bytes(scene.header().page_shift));
     if (by_rays) {
-      budget.charge("shadow rays", threads * DiscLight::thread_bytes(rig, request.light_sampling));
+      budget.charge("shadow rays", threads * DiscLight::thread_bytes(rig, request.light_sampling,
+                                                                     DiscLight::kCellPlaces));
     }
     budget.require();
     if (readers_with(threads) == 0) return std::uint64_t{0};
@@ -270,7 +271,7 @@ LightReport light_points(const LightRequest& request, std::optional<std::size_t>
   std::unique_ptr<Shader> shader;
   if (by_rays) {
     lights = std::make_unique<DiscLight>(view, *cache, rays, request.light_sampling,
-                                         request.gather.sides, executor);
+                                         DiscLight::kCellPlaces, request.gather.sides, executor);
   }
   if (sky) {
     ShadeOptions shade{.gather = request.gather,

@@ -13,17 +13,24 @@
 
 #include <array>
 #include <cmath>
+#include <deque>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "engine/base/error.h"
 #include "engine/base/memory.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/pipeline/light/bounces.h"
+#include "engine/pipeline/scene_record.h"
 #include "engine/scene/light/sky_map.h"
 #include "engine/trace/disc_visibility.h"
 
 namespace ptc {
 namespace {
+
+constexpr double kMostEmitting = 0.25;  // share of the area of a scene for which rays are cast
+constexpr std::uint64_t kEmittingSurfelBytes = 2 * kEmitterBytes;  // of a surfel, two triangles
 
 /// @throws RequestError when parts of the request exclude each other
 void check_combination(const LightingRequest& request) {
@@ -148,8 +155,43 @@ Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progr
 
 Lighting::~Lighting() = default;
 
-void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
-                       const glm::dvec3& eye, const std::filesystem::path& target) {
+void Lighting::plan_lamps(MemoryBudget& budget, const LampRays& lamps) {
+  options_.gather.emission = lamps.emitters;
+  if (request_.bounces == 0) return;
+  // Where much of a scene emits, rays are noisier than the gather is wrong; damaged pages may hold
+  // emitters, so that a run past them gathers what is left
+  Emitting found;
+  if (lamps.emitters && lamps.sampling.area_rays > 0 && !lost_) found = count_emitting(scene_);
+  std::uint64_t emitting = found.area > kMostEmitting * scene_.superblock().area ? 0 : found.count;
+  if (kEmittingSurfelBytes * emitting > budget.left() / 2) {
+    progress_.note(fmt::format(
+        "{} surfels emit, too many for rays under this memory cap: their light is gathered",
+        emitting));
+    emitting = 0;
+  }
+  std::vector<LightRig> rigs;
+  if (emitting > 0) rigs.emplace_back();
+  if (has_lamps(lamps.rig)) rigs.push_back(normalised(lamps.rig));
+  if (rigs.empty()) return;
+  budget.charge("emitters", kEmittingSurfelBytes * emitting);
+  budget.charge("rays at lamps", ReceiverLight::bytes(scene_, rigs, lamps.sampling,
+                                                      executor_.threads(), request_.back_end));
+  has_emitters_ = emitting > 0;
+  options_.gather.emission = lamps.emitters && !has_emitters_;
+  const auto& low = scene_.superblock().bounds_low;
+  const glm::dvec3 origin(low[0], low[1], low[2]);
+  std::deque<LightRays> sets;
+  for (const LightRig& rig : rigs) {
+    const std::uint64_t of_set = sets.empty() ? emitting : 0;
+    sets.emplace_back(rig, emitting_surfels(scene_, origin, request_.lift, of_set), origin, 0);
+  }
+  lamps_ = std::make_unique<ReceiverLight>(scene_, std::move(sets), lamps.sampling,
+                                           request_.gather.sides, request_.back_end, executor_);
+}
+
+void Lighting::prepare(MemoryBudget budget, const Sky& sky, const LampRays& lamps,
+                       unsigned variants, const glm::dvec3& eye,
+                       const std::filesystem::path& target) {
   if (request_.bounced.empty()) {
     charge_bounces(budget, scene_, request_.bounces, executor_.threads());
   } else {
@@ -174,6 +216,10 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
               .visibility = disc_visibility(request_.gather.sides),
               .lost = lost_.get(),
               .variants = variants};
+  // Without light on any surface there is none to gather
+  const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
+  options_.gather.bleeding = request_.bounces > 0 && is_lit;
+  plan_lamps(budget, lamps);
   options_.cache_bytes =
       cache_bytes_left(std::move(budget), scene_, (request_.estimate ? 2 : 1) * executor_.threads(),
                        readers_of(executor_, options_, request_.estimate), request_.back_end);
@@ -183,14 +229,24 @@ void Lighting::prepare(MemoryBudget budget, const Sky& sky, bool emission, unsig
   }
   has_sky_map_ = sky.map != nullptr;
   mirrored_sky_ = sky_function(sky);
-  // Without light on any surface there is none to gather
-  const bool is_lit = scene_.superblock().flux != std::array<double, 3>{};
-  options_.gather.bleeding = request_.bounces > 0 && is_lit;
-  options_.gather.emission = emission;
   if (bounced_) return;
-  bounced_ = bounce_light(
-      scene_, {request_.bounces, options_, request_.lift, roomiest_temp_dir(request_.run, target)},
-      executor_, report_, progress_);
+  bounced_ = bounce_light(scene_,
+                          {request_.bounces, options_, request_.lift, point_emitters(),
+                           roomiest_temp_dir(request_.run, target)},
+                          executor_, report_, progress_);
+}
+
+ReceiverLight* Lighting::point_emitters() const {
+  return has_emitters_ && !lit_by_emitters(scene_) ? lamps_.get() : nullptr;
+}
+
+void Lighting::add_lamps(std::size_t set, std::span<const Receiver> receivers,
+                         std::uint64_t first) {
+  const double before = cpu_seconds();
+  arrives_.resize(receivers.size());
+  lamps_->irradiance(set, receivers, first, arrives_);
+  for (std::size_t i = 0; i < receivers.size(); ++i) results_[i].irradiance += arrives_[i];
+  report_.lamp_cpu_seconds += cpu_seconds() - before;
 }
 
 void Lighting::tune(const std::function<std::vector<Pilot>()>& find_pilots, bool sparse) {
@@ -271,7 +327,8 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
   const std::array all{receivers.size()};
   if (counts.empty()) counts = all;
   results_.resize(receivers.size());
-  const std::uint64_t seed = kRunSeed + first_ + report_.receivers - shaded_before_;
+  const std::uint64_t first = first_ + report_.receivers - shaded_before_;
+  const std::uint64_t seed = kRunSeed + first;
   const double before = cpu_seconds();
   if (receiver_rays() > 0) {
     rays_->trace(receivers, receiver_rays(), seed, results_, progress_);
@@ -298,13 +355,17 @@ LitReceivers Lighting::shade(std::span<const Receiver> receivers,
     }
     lit.estimates = estimates_;
   }
+  // A check sees the light of surfaces, by whatever it came, and nothing else
+  if (has_emitters_) add_lamps(0, receivers, first);
   sample_->add(receivers, lit);
+  if (lamps_ && lamps_->size() > (has_emitters_ ? 1 : 0))
+    add_lamps(lamps_->size() - 1, receivers, first);
   return lit;
 }
 
 void Lighting::write_bounce(std::size_t part, const std::filesystem::path& target) {
-  bounce_part(scene_, lit(), {request_.bounces, options_, request_.lift, {}}, part, target,
-              executor_, report_, progress_);
+  bounce_part(scene_, lit(), {request_.bounces, options_, request_.lift, point_emitters(), {}},
+              part, target, executor_, report_, progress_);
 }
 
 void Lighting::finish() {
@@ -328,7 +389,9 @@ void Lighting::check(const CheckScene& seen) {
   if (request_.check.receivers == 0) return;
   const std::uint64_t references = (seen.mesh ? 4 : 2) * std::uint64_t{request_.check.receivers};
   const Stage stage(report_.seconds, progress_, "check", references, "references");
-  report_.check = sample_->compare(lit(), own_rays(), mirrors_, seen, executor_, progress_);
+  RayOptions with = own_rays();
+  with.emission |= has_emitters_;
+  report_.check = sample_->compare(lit(), with, mirrors_, seen, executor_, progress_);
 }
 
 }  // namespace ptc

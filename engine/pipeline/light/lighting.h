@@ -22,11 +22,13 @@
 #include "engine/base/memory_budget.h"
 #include "engine/base/progress.h"
 #include "engine/parallel/thread_pool.h"
+#include "engine/pipeline/light/receiver_light.h"
 #include "engine/pipeline/quality/check.h"
 #include "engine/pipeline/quality/estimate.h"
 #include "engine/pipeline/quality/mirror_rays.h"
 #include "engine/pipeline/quality/tuning.h"
 #include "engine/pipeline/run.h"
+#include "engine/scene/light/lights.h"
 #include "engine/scene/sampling/sampler.h"
 #include "engine/shade/lost_pages.h"
 #include "engine/shade/shader.h"
@@ -89,6 +91,16 @@ struct LightingRequest {
   RunOptions run;      ///< memory, threads and temporary directories
 };
 
+/// The light that reaches the receivers of a run straight from lamps, by shadow rays at the discs
+/// of the scene (spec/shading.md#emission).
+struct LampRays {
+  /// Whether surfels that emit light the receivers, by rays or else by the gather. Where they do
+  /// not, receivers get nothing of that light, because the caller brings it.
+  bool emitters = false;
+  LightRig rig;            ///< whose suns, point and spot lights light the receivers
+  LightSampling sampling;  ///< rays of each receiver; without area rays emitters are gathered
+};
+
 /// Checks the numbers of a request, each for itself.
 /// @throws RequestError when a setting of the gather, the error asked for or the lift is out of
 ///         range
@@ -114,6 +126,7 @@ struct LightingReport {
   double shade_cpu_seconds = 0;            ///< CPU time of the last bounce, all threads
   double bounce_cpu_seconds = 0;           ///< CPU time of earlier bounces' gathers, all threads
   double glossy_cpu_seconds = 0;           ///< CPU time of reflections, all threads
+  double lamp_cpu_seconds = 0;             ///< CPU time of LampRays at receivers, all threads
   GatherOptions settings;                  ///< of the last bounce's gather; unused by rays
   GatherCounts gather;                     ///< work of the last bounce's gather; none by rays
   CacheStatistics cache;                   ///< page cache of the last bounce
@@ -150,14 +163,13 @@ class Lighting {
   /// Gives the rest of the budget to the page cache, then shades the bounces before the last.
   /// @param budget    already charged with everything else that the caller takes
   /// @param sky       sky that lights the receivers
-  /// @param emission  whether receivers gather what surfaces emit; false where rays bring the light
-  ///                  of emitters
+  /// @param lamps     whose light rays bring to receivers; it is part of their irradiance
   /// @param variants  as ShadeOptions::variants
   /// @param eye       from where receivers are looked at, scene units; for reflections alone
   /// @param target    output of the run; its directory gets temporary files when the request names
   ///                  no directories for them
   /// @throws LimitError when the cap is too small; FormatError, std::system_error
-  void prepare(MemoryBudget budget, const Sky& sky, bool emission, unsigned variants,
+  void prepare(MemoryBudget budget, const Sky& sky, const LampRays& lamps, unsigned variants,
                const glm::dvec3& eye, const std::filesystem::path& target);
 
   /// Chooses the settings and prepares the estimates, as far as the request asks for them.
@@ -215,6 +227,14 @@ class Lighting {
   void check(const CheckScene& seen);
 
  private:
+  /// Collects the lamps at which rays are cast, and charges what that takes.
+  void plan_lamps(MemoryBudget& budget, const LampRays& lamps);
+  /// Adds the light of a set of lamps to the results of receivers.
+  /// @param first  number of the first receiver
+  void add_lamps(std::size_t set, std::span<const Receiver> receivers, std::uint64_t first);
+  /// Returns what lights the points of earlier bounces by rays at emitters; null where their
+  /// emitters have lit them, or nothing emits.
+  [[nodiscard]] ReceiverLight* point_emitters() const;
   /// Returns the options of rays that show the sky as it is.
   [[nodiscard]] RayOptions own_rays() const;
 
@@ -229,6 +249,8 @@ class Lighting {
   ShadeOptions options_;
   bool has_sky_map_ = false;
   std::function<glm::vec3(const glm::vec3&)> mirrored_sky_;  ///< the sky that mirrors show
+  std::unique_ptr<ReceiverLight> lamps_;                     ///< null: no rays are cast at lamps
+  bool has_emitters_ = false;  ///< whether the first set of lamps_ is of emitters
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<Shader> shader_;   ///< null where rays shade the receivers
   std::unique_ptr<RayShader> rays_;  ///< null where the gather shades, and nothing is reflected
@@ -238,6 +260,7 @@ class Lighting {
   std::uint64_t first_ = 0;          ///< number of the first receiver of a range
   std::optional<CheckSample> sample_;
   std::vector<Shading> results_;
+  std::vector<glm::vec3> arrives_;
   std::vector<Reflection> reflections_;
   std::vector<ErrorEstimate> estimates_;
 

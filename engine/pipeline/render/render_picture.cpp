@@ -128,7 +128,8 @@ LightingReport render_part(const RenderRequest& request, std::span<const Picture
   }
   const bool by_emitters =
       subject.has_mesh() ? subject.rays_at_emitters : lit_by_emitters(lighting.scene());
-  lighting.prepare(std::move(budget), lights.sky, !by_emitters,
+  lighting.prepare(std::move(budget), lights.sky,
+                   {.emitters = !by_emitters, .sampling = request.light_sampling},
                    std::min(request.samples, TileRenderer::kMaxVariants), subject.camera.position,
                    targets.front().path);
   bool sparse = false;

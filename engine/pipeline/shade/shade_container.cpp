@@ -189,9 +189,10 @@ LightingReport shade_points(const ShadeRequest& request, const std::filesystem::
   if (!rigs.empty()) {
     budget.charge("shadows", DiscShadows::bytes(lighting.scene(), rigs, threads, request.back_end));
   }
-  // The light that emitters gave the scene's own points is in their radiance
-  const bool emission = receivers.other || !lit_by_emitters(lighting.scene());
-  lighting.prepare(std::move(budget), sky, emission, 1, eye_of(request, lighting.scene()), target);
+  // The light that lamps gave the scene's own points is in their radiance
+  LampRays lamps{.emitters = receivers.other || !lit_by_emitters(lighting.scene())};
+  if (receivers.other) lamps.rig = recorded_rig(lighting.scene());
+  lighting.prepare(std::move(budget), sky, lamps, 1, eye_of(request, lighting.scene()), target);
   lighting.tune([&] { return pilots_of(receivers.container, receivers.points, request.lift); });
 
   // Shade all receivers into the target

@@ -100,8 +100,8 @@ void prepare_points(const ShadeRequest& request, const std::filesystem::path& ta
                     Lighting& lighting, Progress& progress) {
   const ContainerReader& scene = lighting.scene();
   const Sky sky = recorded_lights(scene, request.run, target, progress).sky;
-  lighting.prepare(budget_of(request.run.memory_bytes, "shading"), sky, !lit_by_emitters(scene), 1,
-                   glm::dvec3(0), target);
+  lighting.prepare(budget_of(request.run.memory_bytes, "shading"), sky,
+                   {.emitters = !lit_by_emitters(scene)}, 1, glm::dvec3(0), target);
 }
 
 /// Takes surfels of receivers, the rows of their channels, and their light.
@@ -223,7 +223,8 @@ void shade_part(const ShadeRequest& request, std::size_t part, const std::filesy
       ContainerWriter::memory_bytes(scene.parts()[part]->page_count(), scene.header().page_shift,
                                     lighting.executor().threads()) +
           held_pages_bytes(scene.header().page_shift));
-  lighting.prepare(std::move(budget), {}, false, 1, glm::dvec3(0), target);
+  lighting.prepare(std::move(budget), {}, {.emitters = !lit_by_emitters(scene)}, 1, glm::dvec3(0),
+                   target);
   lighting.write_bounce(part, target);
 }
 
