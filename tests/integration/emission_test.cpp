@@ -303,7 +303,7 @@ TEST_CASE("emission: lamps light the receivers of a file by rays", "[integration
   }
 }
 
-TEST_CASE("emission: suns and spots of the scene light the receivers of a file",
+TEST_CASE("emission: suns and lamps of the scene light the receivers of a file",
           "[integration][emission]") {
   const TemporaryDirectory dir;
   Progress silent;
@@ -326,8 +326,32 @@ TEST_CASE("emission: suns and spots of the scene light the receivers of a file",
                  sun = std::abs(at.x) < 0.5 ? 0 : 2;  // the lamp of 1 x 1 hides it
     CHECK(light[i].r == Approx(lamp + sun + lamp_irradiance({1, 2}, at)).epsilon(0.03));
   }
-  // Its own points have that light in what they reflect
-  shade.receivers.clear();
+  // Also by many threads, each of which reads pages for both kinds of light
+  shade.run = {.memory_bytes = std::uint64_t{4} << 30, .threads = 64};
+  shade_container(shade, dir / "many.ptcx", silent);
+  CHECK(values_of(dir / "many.ptcx").at("irradiance") == light);
+  // Past damage there are no rays, which would read what is damaged
+  {
+    const ContainerReader scene(dir / "a.ptcx");
+    std::fstream(dir / "a.ptcx", std::ios::in | std::ios::out | std::ios::binary)
+        .seekp(static_cast<std::streamoff>(scene.entry(3).offset + kPageHeaderBytes))
+        .write("damage", 6);
+  }
+  shade.run = {};
+  CHECK_THROWS_AS(shade_container(shade, dir / "torn.ptcx", silent), FormatError);
+  shade.tolerate_damage = true;
+  CHECK(shade_container(shade, dir / "torn.ptcx", silent).lamp_cpu_seconds == 0);
+}
+
+TEST_CASE("emission: points of a lit scene have the light of lamps in what they reflect",
+          "[integration][emission]") {
+  const TemporaryDirectory dir;
+  Progress silent;
+  BuildRequest build{.mesh = std::make_shared<const Mesh>(lit_floor()),
+                     .lights = LightRig{.suns = {{{0, 1, 0}, glm::vec3(2), 0}}}};
+  build.sampling.count = 20'000;
+  build_container(build, dir / "a.ptcx", silent);
+  const ShadeRequest shade{{.scene = dir / "a.ptcx"}};
   shade_container(shade, dir / "own.ptcx", silent);
   const std::vector<Surfel> own = points_of(dir / "own.ptcx");
   const std::vector<glm::vec3> gathered = values_of(dir / "own.ptcx").at("irradiance");
@@ -391,6 +415,24 @@ TEST_CASE("emission: a picture of a mesh without the lamp has its light all the 
   }
   CHECK(found.mean() == Approx(1).epsilon(0.01));
   CHECK(found.rms() < 0.05);
+}
+
+TEST_CASE("emission: a sphere of directions gathers the light of lamps",
+          "[integration][emission]") {
+  // Rays would bring it by the cosine at a normal, which does not count
+  const TemporaryDirectory dir;
+  Progress silent;
+  build_room(lamp_room({0.5, 1.2}, true, 0), 0, {}, dir / "a.ptcx");
+  std::ofstream(dir / "places.xyz") << "0 0.6 0 0 1 0\n0 0.6 0.01 0 -1 0\n0.01 0.6 0 1 0 0\n";
+  ShadeRequest shade{{.scene = dir / "a.ptcx"}};
+  shade.receivers = dir / "places.xyz";
+  shade.lift = 0;
+  shade.gather.around.sphere = true;
+  CHECK(shade_container(shade, dir / "lit.ptcx", silent).lamp_cpu_seconds == 0);
+  const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
+  REQUIRE(light.size() == 3);
+  for (const glm::vec3& at : light) CHECK(at.r == Approx(light[0].r).epsilon(0.1));
+  CHECK(light[0].r > 0.1F);
 }
 
 TEST_CASE("emission: where most of a scene emits, the gather brings that light",

@@ -319,3 +319,34 @@ TEST_CASE("area light: 16 rays tell the light of thousands of emitters", "[scene
   CHECK(noise.mean == Approx(1).epsilon(0.03));
   CHECK(noise.rms < 0.35);
 }
+
+TEST_CASE("area light: however few rays are cast, each emitter has its share", "[scene][lights]") {
+  // Two wide lamps side by side, of which one might be hidden: its light alone must be right
+  std::vector<Emitter> emitters = wide_lamp(1, 12);
+  const std::size_t half = emitters.size() / 2;
+  const auto is_near = [](const EmitterSample& sample) { return sample.position.z < 0; };
+  std::vector<Emitter> near;
+  for (const Emitter& emitter : emitters) {
+    if (emitter.corner[0].z + emitter.corner[1].z + emitter.corner[2].z < 0)
+      near.push_back(emitter);
+  }
+  REQUIRE(near.size() == half);
+  const AreaLights all(emitters), alone(near);
+  const glm::vec3 at(0.3F, 0, 0.4F);
+  std::vector<EmitterSample> samples;
+  alone.sample(at, kUp, 16384, 1, 0, samples);
+  double wanted = 0;
+  for (const EmitterSample& sample : samples) wanted += double{sample.irradiance.x};
+  for (const unsigned count : {1U, 2U, 4U, 8U, 16U, 64U}) {
+    double sum = 0;
+    constexpr std::uint64_t kSeeds = 20'000;
+    for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
+      all.sample(at, kUp, count, seed, count * (seed % 4), samples);
+      for (const EmitterSample& sample : samples) {
+        if (is_near(sample)) sum += double{sample.irradiance.x} / double{kSeeds};
+      }
+    }
+    INFO(count << " samples: " << sum << " of " << wanted);
+    CHECK(sum == Approx(wanted).epsilon(0.01));
+  }
+}

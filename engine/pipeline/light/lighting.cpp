@@ -29,7 +29,9 @@
 namespace ptc {
 namespace {
 
-constexpr double kMostEmitting = 0.25;  // share of the area of a scene for which rays are cast
+// Emitters at which rays are cast: share of the area of a scene, and number of surfels, at most
+constexpr double kMostEmitting = 0.25;
+constexpr std::uint64_t kMostEmitters = std::uint64_t{1} << 17;
 constexpr std::uint64_t kEmittingSurfelBytes = 2 * kEmitterBytes;  // of a surfel, two triangles
 
 /// @throws RequestError when parts of the request exclude each other
@@ -157,17 +159,19 @@ Lighting::~Lighting() = default;
 
 void Lighting::plan_lamps(MemoryBudget& budget, const LampRays& lamps) {
   options_.gather.emission = lamps.emitters;
-  if (request_.bounces == 0) return;
-  // Where much of a scene emits, rays are noisier than the gather is wrong; damaged pages may hold
-  // emitters, so that a run past them gathers what is left
-  Emitting found;
-  if (lamps.emitters && lamps.sampling.area_rays > 0 && !lost_) found = count_emitting(scene_);
-  std::uint64_t emitting = found.area > kMostEmitting * scene_.superblock().area ? 0 : found.count;
-  if (kEmittingSurfelBytes * emitting > budget.left() / 2) {
-    progress_.note(fmt::format(
-        "{} surfels emit, too many for rays under this memory cap: their light is gathered",
-        emitting));
-    emitting = 0;
+  // Rays arrive by the cosine at the normal; and damaged pages may hold emitters or what hides them
+  const Surroundings& around = request_.gather.around;
+  const bool by_cosine = !around.sphere && around.cone >= Surroundings{}.cone;
+  if (request_.bounces == 0 || !by_cosine || lost_) return;
+  // Whether rays are cast depends on the scene alone, so that neither cap nor threads change
+  // results
+  std::uint64_t emitting = 0;
+  if (lamps.emitters && lamps.sampling.area_rays > 0 && may_emit(scene_)) {
+    const Stage stage(report_.seconds, progress_, "find emitters", 0, "points");
+    const Emitting found = count_emitting(scene_);
+    const bool few =
+        found.count <= kMostEmitters && found.area <= kMostEmitting * scene_.superblock().area;
+    if (few) emitting = found.count;
   }
   std::vector<LightRig> rigs;
   if (emitting > 0) rigs.emplace_back();
@@ -176,6 +180,7 @@ void Lighting::plan_lamps(MemoryBudget& budget, const LampRays& lamps) {
   budget.charge("emitters", kEmittingSurfelBytes * emitting);
   budget.charge("rays at lamps", ReceiverLight::bytes(scene_, rigs, lamps.sampling,
                                                       executor_.threads(), request_.back_end));
+  budget.require();
   has_emitters_ = emitting > 0;
   options_.gather.emission = lamps.emitters && !has_emitters_;
   const auto& low = scene_.superblock().bounds_low;

@@ -8,8 +8,13 @@ namespace {
 
 constexpr std::uint64_t kCacheBytes = std::uint64_t{24} << 20;
 
-std::uint64_t cache_bytes(const ContainerReader& scene, unsigned threads, BackEnd back_end) {
-  return std::max(kCacheBytes, PageCache::min_bytes(scene, threads, back_end));
+/// @param readers  a thread for each set of lights
+std::uint64_t cache_bytes(const ContainerReader& scene, unsigned readers, BackEnd back_end) {
+  return std::max(kCacheBytes, PageCache::min_bytes(scene, readers, back_end));
+}
+
+unsigned readers_of(std::size_t sets, unsigned threads) {
+  return threads * static_cast<unsigned>(sets);
 }
 
 }  // namespace
@@ -17,7 +22,7 @@ std::uint64_t cache_bytes(const ContainerReader& scene, unsigned threads, BackEn
 std::uint64_t ReceiverLight::bytes(const ContainerReader& scene, std::span<const LightRig> rigs,
                                    const LightSampling& sampling, unsigned threads,
                                    BackEnd back_end) {
-  std::uint64_t sum = cache_bytes(scene, threads, back_end);
+  std::uint64_t sum = cache_bytes(scene, readers_of(rigs.size(), threads), back_end);
   for (const LightRig& rig : rigs) sum += threads * DiscLight::thread_bytes(rig, sampling, 1);
   return sum;
 }
@@ -26,8 +31,9 @@ ReceiverLight::ReceiverLight(const ContainerReader& scene, std::deque<LightRays>
                              const LightSampling& sampling, Sides sides, BackEnd back_end,
                              const Executor& executor)
     : view_(scene),
-      cache_(scene, CacheOptions{.memory_bytes = cache_bytes(scene, executor.threads(), back_end),
-                                 .threads = executor.threads() * static_cast<unsigned>(sets.size()),
+      cache_(scene, CacheOptions{.memory_bytes = cache_bytes(
+                                     scene, readers_of(sets.size(), executor.threads()), back_end),
+                                 .threads = readers_of(sets.size(), executor.threads()),
                                  .back_end = back_end}),
       sets_(std::move(sets)) {
   for (const LightRays& rays : sets_)

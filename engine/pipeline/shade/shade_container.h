@@ -52,7 +52,7 @@ struct ShadeRequest : LightingRequest {
 ///   channel            components
 ///   occlusion          1   cosine-weighted share of the hemisphere that is covered, 0 to 1
 ///   bent_normal        3   unit mean of the uncovered directions; the normal when none is
-///   irradiance         3   from surfaces, W / m^2
+///   irradiance         3   from surfaces, W / m^2; to receivers of a file from suns and lamps, too
 ///   sky                3   irradiance from the uncovered sky, W / m^2
 ///   indirect           3   albedo / pi * (irradiance + sky): the radiance that leaves
 ///   occlusion_error    1   estimated error, only with LightingRequest::estimate

@@ -206,7 +206,8 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
     choose_from(0, static_cast<std::uint32_t>(emitters_.size()), 1, position, normal, choices);
     if (choices.empty()) return;
   }
-  const SquarePoints points(seed);
+  // What several draws leave depends on all of them, because their numbers are spread together
+  const SquarePoints points(seed), choosing(seed ^ 1);
   const unsigned draws = std::max(1U, kLeastDraws / std::max(1U, count));
   for (std::uint32_t i = 0; i < count; ++i) {
     // Choose an emitter by its weight
@@ -215,6 +216,7 @@ void AreaLights::sample(const glm::vec3& position, const glm::vec3& normal, unsi
       choices.clear();
       unit = choose_by_tree(position, normal, points, (first + i) * draws, draws, choices);
       if (choices.empty()) continue;
+      if (draws > 1) unit = choosing.line(first + i);
     }
     const double total = choices.back().sum;
     const auto chosen = std::min(

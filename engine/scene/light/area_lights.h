@@ -55,7 +55,7 @@ class AreaLights {
                    const glm::vec3& normal, std::vector<Choice>& out) const;
   /// Draws candidates by the tree.
   /// @param first  number of the first of the points on a line by which they are drawn
-  /// @return       number in [0, 1) that the draws leave
+  /// @return       number in [0, 1) that the last draw leaves
   double choose_by_tree(const glm::vec3& position, const glm::vec3& normal,
                         const SquarePoints& points, std::uint32_t first, unsigned draws,
                         std::vector<Choice>& out) const;

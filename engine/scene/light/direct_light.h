@@ -15,7 +15,7 @@ namespace ptc {
 
 /// Direct irradiance at surface points by shadow rays. Results are deterministic: the seed fixes
 /// the sample points.
-/// Memory: 60 bytes for each of emitters_of(), 4 bytes for each pixel of the sky map.
+/// Memory: 76 bytes for each of emitters_of(), 4 bytes for each pixel of the sky map.
 /// Threads: const members may be called concurrently.
 class DirectLight {
  public:

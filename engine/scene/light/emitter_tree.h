@@ -15,16 +15,14 @@ namespace ptc {
 /// Draws emitters in proportion to about the light that they may give to a place: their power, over
 /// the square of the distance, times the cosines there and at them.
 ///
-///            (  all  )            From the root on, one of two halves is drawn by bounds of what
-///            its
-///           /         \           emitters may give, down to a few neighbours. One random number
-///           is
-///        (   )       (   )        stretched from level to level, so that numbers spread evenly
-///        draw /   \       /   \        emitters that are spread, too.
+///            (  all  )        From the root on, one of two halves is drawn by what its
+///           /         \       emitters may give, down to a few neighbours. One random number
+///        (   )       (   )    is stretched from level to level, so that numbers which are
+///        /   \       /   \    spread evenly draw emitters that are spread, too.
 ///      ...   ...   ...   ...
 ///
 /// Source: Conty Estevez and Kulla 2018, Importance sampling of many lights with adaptive tree
-/// splitting; without the splitting.
+/// splitting: without the splitting, and with a part of their bound.
 /// Memory: 28 bytes for each emitter.   Threads: const members may be called concurrently.
 class EmitterTree {
  public:
