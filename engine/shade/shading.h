@@ -60,10 +60,11 @@ struct Surroundings {
   /// all of it up to `distance`.
   unsigned falloff = 1;
 
+  /// Says whether all directions above the normal count, by their cosine.
+  [[nodiscard]] bool is_hemisphere() const noexcept { return !sphere && cone >= 1.5707963F; }
   /// Says whether this is the whole hemisphere at any distance.
   [[nodiscard]] bool is_plain() const noexcept {
-    return !sphere && cone >= 1.5707963F && diagonals == 0 &&
-           distance == std::numeric_limits<float>::infinity();
+    return is_hemisphere() && diagonals == 0 && distance == std::numeric_limits<float>::infinity();
   }
 };
 

@@ -258,6 +258,23 @@ void build_room(const Mesh& mesh, unsigned area_rays, const LightRig& rig,
   build_container(build, target, silent);
 }
 
+/// The points of a shaded container.
+struct Lit {
+  explicit Lit(const std::filesystem::path& path)
+      : frame(ContainerReader(path).header().frame),
+        surfels(points_of(path)),
+        irradiance(values_of(path).at("irradiance")) {}
+
+  /// Returns where the receiver of a point is.
+  [[nodiscard]] glm::dvec3 place(std::size_t i) const {
+    return lifted(surfels[i], 0.15F, frame).position;
+  }
+
+  Frame frame;
+  std::vector<Surfel> surfels;
+  std::vector<glm::vec3> irradiance;
+};
+
 /// The differences of values from what they should be.
 struct Differences {
   double sum = 0, wanted = 0, square = 0, wanted_square = 0;
@@ -291,13 +308,11 @@ TEST_CASE("emission: lamps light the receivers of a file by rays", "[integration
     shade.receivers = dir / "floor.xyz";
     const LightingReport report = shade_container(shade, dir / "lit.ptcx", silent);
     CHECK(report.lamp_cpu_seconds > 0);
-    const Frame frame = ContainerReader(dir / "lit.ptcx").header().frame;
-    const std::vector<Surfel> floor = points_of(dir / "lit.ptcx");
-    const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
-    REQUIRE(light.size() == 1600);
+    const Lit floor(dir / "lit.ptcx");
+    REQUIRE(floor.irradiance.size() == 1600);
     Differences found;
-    for (std::size_t i = 0; i < floor.size(); ++i)
-      found.add(light[i].r, lamp_irradiance(lamp, lifted(floor[i], 0.15F, frame).position));
+    for (std::size_t i = 0; i < floor.irradiance.size(); ++i)
+      found.add(floor.irradiance[i].r, lamp_irradiance(lamp, floor.place(i)));
     CHECK(found.mean() == Approx(1).epsilon(0.01));
     CHECK(found.rms() < 0.05);
   }
@@ -316,20 +331,18 @@ TEST_CASE("emission: suns and lamps of the scene light the receivers of a file",
   ShadeRequest shade{{.scene = dir / "a.ptcx"}};
   shade.receivers = dir / "floor.xyz";
   shade_container(shade, dir / "lit.ptcx", silent);
-  const Frame frame = ContainerReader(dir / "lit.ptcx").header().frame;
-  const std::vector<Surfel> floor = points_of(dir / "lit.ptcx");
-  const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
-  for (std::size_t i = 0; i < floor.size(); ++i) {
-    const glm::dvec3 at = lifted(floor[i], 0.15F, frame).position;
+  const Lit floor(dir / "lit.ptcx");
+  for (std::size_t i = 0; i < floor.irradiance.size(); ++i) {
+    const glm::dvec3 at = floor.place(i);
     const glm::dvec3 way = glm::dvec3(1.5, 0.5, 0) - at;
     const double lamp = 0.25 * way.y / std::pow(glm::length(way), 3),
                  sun = std::abs(at.x) < 0.5 ? 0 : 2;  // the lamp of 1 x 1 hides it
-    CHECK(light[i].r == Approx(lamp + sun + lamp_irradiance({1, 2}, at)).epsilon(0.03));
+    CHECK(floor.irradiance[i].r == Approx(lamp + sun + lamp_irradiance({1, 2}, at)).epsilon(0.03));
   }
   // Also by many threads, each of which reads pages for both kinds of light
   shade.run = {.memory_bytes = std::uint64_t{4} << 30, .threads = 64};
   shade_container(shade, dir / "many.ptcx", silent);
-  CHECK(values_of(dir / "many.ptcx").at("irradiance") == light);
+  CHECK(Lit(dir / "many.ptcx").irradiance == floor.irradiance);
   // Past damage there are no rays, which would read what is damaged
   {
     const ContainerReader scene(dir / "a.ptcx");
@@ -353,10 +366,9 @@ TEST_CASE("emission: points of a lit scene have the light of lamps in what they 
   build_container(build, dir / "a.ptcx", silent);
   const ShadeRequest shade{{.scene = dir / "a.ptcx"}};
   shade_container(shade, dir / "own.ptcx", silent);
-  const std::vector<Surfel> own = points_of(dir / "own.ptcx");
-  const std::vector<glm::vec3> gathered = values_of(dir / "own.ptcx").at("irradiance");
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    if (own[i].position.y < 1) REQUIRE(gathered[i].r < 0.01F);
+  const Lit own(dir / "own.ptcx");
+  for (std::size_t i = 0; i < own.surfels.size(); ++i) {
+    if (own.surfels[i].position.y < 1) REQUIRE(own.irradiance[i].r < 0.01F);
   }
 }
 
@@ -372,20 +384,18 @@ TEST_CASE("emission: rays light points that no emitter has lit, in every bounce"
   const auto shaded = [&](const char* scene, unsigned bounces) {
     ShadeRequest shade{{.scene = dir / scene, .bounces = bounces}};
     shade_container(shade, dir / "shaded.ptcx", silent);
-    std::pair<std::vector<Surfel>, std::vector<glm::vec3>> result(
-        points_of(dir / "shaded.ptcx"), values_of(dir / "shaded.ptcx").at("irradiance"));
-    return result;
+    return Lit(dir / "shaded.ptcx");
   };
-  const auto [lit, indirect] = shaded("lit.ptcx", 2);
-  const auto [dark, light] = shaded("dark.ptcx", 3);
-  REQUIRE(lit.size() == dark.size());
+  const Lit lit = shaded("lit.ptcx", 2), dark = shaded("dark.ptcx", 3);
+  REQUIRE(lit.surfels.size() == dark.surfels.size());
   Differences found;
-  for (std::size_t i = 0; i < lit.size(); ++i) {
-    REQUIRE(lit[i].position == dark[i].position);
-    if (lit[i].position.y > 0.1) continue;
-    REQUIRE(dark[i].radiance.r == 0);
-    found.add(double{light[i].r},
-              double{indirect[i].r} + double{lit[i].radiance.r} * std::numbers::pi / 0.6);
+  for (std::size_t i = 0; i < lit.surfels.size(); ++i) {
+    REQUIRE(lit.surfels[i].position == dark.surfels[i].position);
+    if (lit.surfels[i].position.y > 0.1) continue;
+    REQUIRE(dark.surfels[i].radiance.r == 0);
+    found.add(
+        double{dark.irradiance[i].r},
+        double{lit.irradiance[i].r} + double{lit.surfels[i].radiance.r} * std::numbers::pi / 0.6);
   }
   CHECK(found.mean() == Approx(1).epsilon(0.01));
   CHECK(found.rms() < 0.05);
@@ -429,7 +439,7 @@ TEST_CASE("emission: a sphere of directions gathers the light of lamps",
   shade.lift = 0;
   shade.gather.around.sphere = true;
   CHECK(shade_container(shade, dir / "lit.ptcx", silent).lamp_cpu_seconds == 0);
-  const std::vector<glm::vec3> light = values_of(dir / "lit.ptcx").at("irradiance");
+  const std::vector<glm::vec3> light = Lit(dir / "lit.ptcx").irradiance;
   REQUIRE(light.size() == 3);
   for (const glm::vec3& at : light) CHECK(at.r == Approx(light[0].r).epsilon(0.1));
   CHECK(light[0].r > 0.1F);

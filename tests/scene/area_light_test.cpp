@@ -285,7 +285,7 @@ Noise noise_of(const AreaLights& lights, const Wanted& wanted) {
 }  // namespace
 
 TEST_CASE("area light: 16 rays tell the light of thousands of emitters", "[scene][lights]") {
-  // Of a wide lamp: the light of the whole square, by the formula for its corners
+  // A wide lamp is compared with the formula for the corners of the whole square
   for (const auto& [height, most] : {std::pair(0.3F, 0.08), {0.6F, 0.04}, {2.0F, 0.008}}) {
     const AreaLights lights(wide_lamp(height, 60));
     const auto formula = [&](const glm::vec3& at) {
@@ -301,7 +301,7 @@ TEST_CASE("area light: 16 rays tell the light of thousands of emitters", "[scene
     CHECK(noise.mean == Approx(1).epsilon(0.01));
     CHECK(noise.rms < most);
   }
-  // Of scattered ones: the sum of what each brings alone
+  // Scattered emitters are compared with the sum of what each brings alone
   const std::vector<Emitter> emitters = scattered(2000);
   std::vector<AreaLights> each;
   for (const Emitter& emitter : emitters) each.emplace_back(std::vector<Emitter>{emitter});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -169,13 +170,14 @@ Emitting count_emitting(const ContainerReader& container) {
   return emitting;
 }
 
-std::vector<Emitter> emitting_surfels(const ContainerReader& container, const glm::dvec3& origin,
-                                      float lift, std::uint64_t count) {
-  std::vector<Emitter> emitters;
-  if (count == 0) return emitters;
-  emitters.reserve(2 * count);
+LightRays rays_at_lights(const ContainerReader& container, const LightRig& rig, float lift,
+                         std::uint64_t count) {
+  const auto& low = container.superblock().bounds_low;
+  const glm::dvec3 origin(low[0], low[1], low[2]);
   const Frame& frame = container.header().frame;
-  for_each_emitting(container, [&](const PointRecord& point) {
+  std::vector<Emitter> emitters;
+  emitters.reserve(2 * count);
+  const auto add = [&](const PointRecord& point) {
     const Surfel surfel = to_surfel(point, frame);
     const Basis basis(surfel.normal);
     const glm::vec3 centre(lifted(surfel, std::max(lift, kLeastLift), frame).position - origin);
@@ -183,8 +185,9 @@ std::vector<Emitter> emitting_surfels(const ContainerReader& container, const gl
     const glm::vec3 a = basis.x * surfel.radius, b = basis.y * surfel.radius;
     emitters.push_back({{centre + a, centre + b, centre - a}, surfel.emission});
     emitters.push_back({{centre - a, centre - b, centre + a}, surfel.emission});
-  });
-  return emitters;
+  };
+  if (count > 0) for_each_emitting(container, add);
+  return {rig, std::move(emitters), origin, 0};
 }
 
 }  // namespace ptc

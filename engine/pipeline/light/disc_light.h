@@ -93,15 +93,15 @@ struct Emitting {
 /// @throws FormatError when a page is damaged; std::system_error
 [[nodiscard]] Emitting count_emitting(const ContainerReader& container);
 
-/// Returns the emitting surfels of a container as triangles: two for the square cell of each, at
-/// the height of a receiver or above, so that rays which end there do not meet the surfel itself.
-/// @param origin  to which they are relative, scene units
-/// @param lift    height over the radius of a surfel, for receivers; less than usual is not taken
-/// @param count   Emitting::count
+/// Returns rays to the lights of a rig and to the emitting surfels of a container. Each of these is
+/// two triangles for its square cell, at the height of a receiver or above, so that rays which end
+/// there do not meet the surfel itself.
+/// @param rig    normalised()
+/// @param lift   height over the radius of a surfel, for receivers; less than usual is not taken
+/// @param count  Emitting::count; 0: there are no rays to surfels
 /// @throws FormatError when a page is damaged; std::system_error
-/// Memory: 48 bytes for each triangle.
-[[nodiscard]] std::vector<Emitter> emitting_surfels(const ContainerReader& container,
-                                                    const glm::dvec3& origin, float lift,
-                                                    std::uint64_t count);
+/// Memory: 2 kEmitterBytes for each emitting surfel.
+[[nodiscard]] LightRays rays_at_lights(const ContainerReader& container, const LightRig& rig,
+                                       float lift, std::uint64_t count);
 
 }  // namespace ptc

@@ -258,12 +258,7 @@ LightReport light_points(const LightRequest& request, std::optional<std::size_t>
                    .memory_bytes = cache_bytes, .threads = readers, .back_end = request.back_end});
   }
 
-  const glm::dvec3 origin(scene.superblock().bounds_low[0], scene.superblock().bounds_low[1],
-                          scene.superblock().bounds_low[2]);
-  const LightRays rays(rig,
-                       emitting > 0 ? emitting_surfels(scene, origin, request.lift, emitting)
-                                    : std::vector<Emitter>(),
-                       origin, 0);
+  const LightRays rays = rays_at_lights(scene, rig, request.lift, emitting);
 
   // Light all points into the target
   const SceneView view(scene);

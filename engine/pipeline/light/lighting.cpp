@@ -160,11 +160,8 @@ Lighting::~Lighting() = default;
 void Lighting::plan_lamps(MemoryBudget& budget, const LampRays& lamps) {
   options_.gather.emission = lamps.emitters;
   // Rays arrive by the cosine at the normal; and damaged pages may hold emitters or what hides them
-  const Surroundings& around = request_.gather.around;
-  const bool by_cosine = !around.sphere && around.cone >= Surroundings{}.cone;
-  if (request_.bounces == 0 || !by_cosine || lost_) return;
-  // Whether rays are cast depends on the scene alone, so that neither cap nor threads change
-  // results
+  if (request_.bounces == 0 || !request_.gather.around.is_hemisphere() || lost_) return;
+  // The scene alone decides on rays at emitters, so that neither cap nor threads change results
   std::uint64_t emitting = 0;
   if (lamps.emitters && lamps.sampling.area_rays > 0 && may_emit(scene_)) {
     const Stage stage(report_.seconds, progress_, "find emitters", 0, "points");
@@ -183,13 +180,9 @@ void Lighting::plan_lamps(MemoryBudget& budget, const LampRays& lamps) {
   budget.require();
   has_emitters_ = emitting > 0;
   options_.gather.emission = lamps.emitters && !has_emitters_;
-  const auto& low = scene_.superblock().bounds_low;
-  const glm::dvec3 origin(low[0], low[1], low[2]);
   std::deque<LightRays> sets;
-  for (const LightRig& rig : rigs) {
-    const std::uint64_t of_set = sets.empty() ? emitting : 0;
-    sets.emplace_back(rig, emitting_surfels(scene_, origin, request_.lift, of_set), origin, 0);
-  }
+  for (const LightRig& rig : rigs)
+    sets.push_back(rays_at_lights(scene_, rig, request_.lift, sets.empty() ? emitting : 0));
   lamps_ = std::make_unique<ReceiverLight>(scene_, std::move(sets), lamps.sampling,
                                            request_.gather.sides, request_.back_end, executor_);
 }

@@ -45,11 +45,13 @@ void EmitterTree::add(std::span<Emitter> emitters, std::uint32_t first, std::uin
   glm::dvec3 low(std::numeric_limits<double>::max()), high(-low), axis(0), centre(0);
   double power = 0;
   for (const Emitter& emitter : some) {
-    power += power_of(emitter);
+    const glm::dvec3 middle = middle_of(emitter);
+    const double own = power_of(emitter);
+    power += own;
     axis += twice_area_of(emitter) * brightness(emitter.radiance);
-    centre += middle_of(emitter) * power_of(emitter);
-    low = glm::min(low, middle_of(emitter));
-    high = glm::max(high, middle_of(emitter));
+    centre += middle * own;
+    low = glm::min(low, middle);
+    high = glm::max(high, middle);
   }
   Node node{.centre = glm::vec3(centre / power), .power = power, .first = first, .end = end};
   const double length = glm::length(axis);
@@ -58,11 +60,12 @@ void EmitterTree::add(std::span<Emitter> emitters, std::uint32_t first, std::uin
   double radius = 0, cone = 1, spread = 0;
   for (const Emitter& emitter : some) {
     const glm::dvec3 area = twice_area_of(emitter);
+    const double share = power_of(emitter) / (3 * power);
     cone = std::min(cone, glm::dot(axis, area) / glm::length(area));
     for (const glm::vec3& corner : emitter.corner) {
       const glm::dvec3 way = glm::dvec3(corner) - glm::dvec3(node.centre);
       radius = std::max(radius, glm::length(way));
-      spread += power_of(emitter) * glm::dot(way, way) / (3 * power);
+      spread += share * glm::dot(way, way);
     }
   }
   // Rounding must not leave out what may just give light
