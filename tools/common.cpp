@@ -254,7 +254,7 @@ void Command::add_common_options() {
            "Cap on resident memory, caches included, such as 256M")
       ->group(kGroup);
   add_integer(app_, "--threads", run_options_.threads, 0, 4096,
-              "Number of threads; 0: one a core, as the cap has room")
+              "Number of threads; 0 means one for each core")
       ->group(kGroup);
   app_.add_option("--temp", run_options_.temp_dirs,
                   "Directory for temporary files; repeatable [default: that of the output]")

@@ -47,16 +47,6 @@ ThreadsThatFit threads_that_fit(const RunOptions& run,
   }
 }
 
-unsigned threads_within(const RunOptions& run, std::uint64_t thread_bytes, std::uint64_t bytes) {
-  const unsigned threads = ThreadPool::count(run.threads);
-  if (run.threads > 0) return threads;
-  return static_cast<unsigned>(std::clamp<std::uint64_t>(bytes / thread_bytes, 1, threads));
-}
-
-unsigned gathering_threads(const RunOptions& run, bool estimates) {
-  return threads_within(run, (estimates ? 2 : 1) * kGatherBytes, run.memory_bytes / 2);
-}
-
 const std::filesystem::path& with_directory_under(const std::filesystem::path& scene,
                                                   const RunOptions& run) {
   const InputFile file(scene);

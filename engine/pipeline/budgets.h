@@ -43,18 +43,6 @@ struct ThreadsThatFit {
 [[nodiscard]] ThreadsThatFit threads_that_fit(
     const RunOptions& run, const std::function<std::uint64_t(unsigned threads)>& left);
 
-/// Returns the threads of a run: RunOptions::threads or, where that is 0, one for each core of the
-/// machine, but no more than a part of the cap has room for.
-/// @param thread_bytes  memory of each thread
-/// @param bytes         memory that all may take
-/// @throws RequestError as ThreadPool does
-[[nodiscard]] unsigned threads_within(const RunOptions& run, std::uint64_t thread_bytes,
-                                      std::uint64_t bytes);
-/// Returns the threads of a run that gathers: half of its cap has room for those that are not asked
-/// for.
-/// @param estimates  whether each gathers twice at once
-[[nodiscard]] unsigned gathering_threads(const RunOptions& run, bool estimates);
-
 /// Checks that the directory of a container can be read under the cap of a run, before it is.
 /// @return `scene`
 /// @throws LimitError; FormatError, std::system_error as ContainerReader does

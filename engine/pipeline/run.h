@@ -20,7 +20,7 @@ struct RunOptions {
   /// Maximum of resident bytes, caches included. A run that cannot keep to it throws LimitError,
   /// whose text names the least cap that works.
   std::uint64_t memory_bytes = std::uint64_t{2} << 30;
-  /// Number of threads; 0 means one for each core that the cap has room for.
+  /// Number of threads; 0 means as many as the machine has cores.
   unsigned threads = 0;
   /// Directories over which temporary files are spread; when empty, the output's directory.
   std::vector<std::filesystem::path> temp_dirs;

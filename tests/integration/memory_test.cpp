@@ -6,7 +6,6 @@
 #include <catch2/catch.hpp>
 
 #include "engine/base/error.h"
-#include "engine/parallel/thread_pool.h"
 #include "engine/pipeline/budgets.h"
 #include "engine/ptc.h"
 #include "engine/store/reader.h"
@@ -180,19 +179,4 @@ TEST_CASE("memory: the cap for shading covers the directory of every open contai
     });
   };
   CHECK(picture("many.ptcx") == picture("few.ptcx") + 40 * (many - few));
-}
-
-TEST_CASE("memory: as many threads as half of the cap has room for, unless they are asked for",
-          "[integration][memory]") {
-  constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
-  const unsigned cores = ThreadPool::count(0);
-  CHECK(threads_within({}, kMiB, kMiB) == 1);
-  CHECK(threads_within({}, kMiB, cores * kMiB) == cores);
-  CHECK(threads_within({}, kMiB, (cores + 1) * kMiB) == cores);
-  CHECK(threads_within({}, kMiB, 0) == 1);
-  CHECK(threads_within({.threads = 7}, kMiB, kMiB) == 7);
-  CHECK(gathering_threads({.memory_bytes = 33 * kMiB}, false) == 1);
-  CHECK(gathering_threads({.memory_bytes = 32 * kMiB * cores}, false) == cores);
-  CHECK(gathering_threads({.memory_bytes = 64 * kMiB * cores}, true) == cores);
-  CHECK(gathering_threads({.memory_bytes = 65 * kMiB}, true) == 1);
 }

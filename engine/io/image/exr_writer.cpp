@@ -70,7 +70,7 @@ std::vector<std::string> channel_names(const ExrLayerType& layer) {
 
 void check_layers(const ImageWindow& window, const std::vector<ExrLayerType>& layers) {
   const ImageWindow& w = window;
-  if (!is_written_size(w.width, w.height) || !is_written_size(w.full_width, w.full_height) ||
+  if (!is_image_size(w.width, w.height) || !is_image_size(w.full_width, w.full_height) ||
       w.width > w.full_width || w.x > w.full_width - w.width || w.height > w.full_height ||
       w.y > w.full_height - w.height) {
     throw std::invalid_argument("ExrWriter: the size is out of range");

@@ -17,16 +17,13 @@ namespace ptc {
 
 /// The greatest width and height of a picture that is read or written, pixels.
 inline constexpr unsigned kMaxImageSide = 1U << 16;
-/// The greatest number of pixels of a picture that is read.
+/// The greatest number of pixels of a picture that is read or written.
 inline constexpr std::uint64_t kMaxImagePixels = std::uint64_t{1} << 28;
 
-/// Says whether a picture of this size is written, row by row.
-[[nodiscard]] constexpr bool is_written_size(std::uint64_t width, std::uint64_t height) noexcept {
-  return width > 0 && height > 0 && width <= kMaxImageSide && height <= kMaxImageSide;
-}
-/// Says whether a picture of this size is read: one that could be written, of not too many pixels.
+/// Says whether a picture of this size is read and written: one with pixels, within both limits.
 [[nodiscard]] constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) noexcept {
-  return is_written_size(width, height) && width * height <= kMaxImagePixels;
+  return width > 0 && height > 0 && width <= kMaxImageSide && height <= kMaxImageSide &&
+         width * height <= kMaxImagePixels;
 }
 
 /// A picture of linear RGB values, row by row from the top.
@@ -104,7 +101,7 @@ class ExrWriter {
   /// Creates a temporary file for the picture.
   /// @param window  that the file holds: its data window; the picture is its display window
   /// @param text    attributes of the header, whose names have 1 to 31 bytes
-  /// @throws std::system_error; std::invalid_argument when a size is not is_written_size(), the
+  /// @throws std::system_error; std::invalid_argument when a size is not is_image_size(), the
   ///         window leaves the picture, there is no layer or two have the same name
   ExrWriter(const std::filesystem::path& target, const ImageWindow& window,
             std::vector<ExrLayerType> layers, const ExrText& text = {});
@@ -141,7 +138,7 @@ void write_exr(const std::filesystem::path& target, unsigned width, unsigned hei
 class PngWriter {
  public:
   /// Creates a temporary file for the picture.
-  /// @throws std::system_error; std::invalid_argument when the size is not is_written_size()
+  /// @throws std::system_error; std::invalid_argument when the size is not is_image_size()
   PngWriter(const std::filesystem::path& target, unsigned width, unsigned height);
   ~PngWriter();
   PngWriter(const PngWriter&) = delete;

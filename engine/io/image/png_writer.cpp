@@ -68,7 +68,7 @@ struct PngWriter::State : PngGuard {
 };
 
 PngWriter::PngWriter(const std::filesystem::path& target, unsigned width, unsigned height) {
-  if (!is_written_size(width, height)) {
+  if (!is_image_size(width, height)) {
     throw std::invalid_argument("PngWriter: the size is out of range");
   }
   state_ = std::make_unique<State>(target, width, height);

@@ -75,8 +75,7 @@ class Build {
         bounds_from_(from),
         target_(behind_links(target)),
         progress_(progress),
-        executor_(threads_within(request.run, ContainerWriter::writing_bytes(request.page_shift, 1),
-                                 request.run.memory_bytes / 4)) {}
+        executor_(request.run.threads) {}
 
   BuildReport run() {
     // Check the request, open the scene and what an interrupted build left

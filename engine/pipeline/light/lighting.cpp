@@ -149,7 +149,7 @@ Lighting::Lighting(const LightingRequest& request, LightingReport& report, Progr
     : request_(checked(request)),
       report_(report),
       progress_(progress),
-      executor_(gathering_threads(request.run, request.estimate)),
+      executor_(request.run.threads),
       scene_(with_directory_under(request.scene, request.run)) {
   if (request.tolerate_damage) lost_ = std::make_unique<LostPages>(scene_);
   report_.bounces = request.bounces;

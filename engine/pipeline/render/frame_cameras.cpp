@@ -17,10 +17,11 @@ namespace {
 
 /// @throws RequestError when a picture of this camera has no pixels or too many
 void check_size(const Camera& camera) {
-  if (is_written_size(camera.width, camera.height)) return;
-  throw RequestError("size", fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along "
-                                         "each side",
-                                         camera.width, camera.height, kMaxImageSide));
+  if (is_image_size(camera.width, camera.height)) return;
+  throw RequestError("size",
+                     fmt::format("`size` is {} x {}: a picture has 1 to {} pixels along each "
+                                 "side, and at most {} in all",
+                                 camera.width, camera.height, kMaxImageSide, kMaxImagePixels));
 }
 
 /// Returns the index of the camera with a name. @throws RequestError when there is none
